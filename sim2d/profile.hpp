@@ -9,11 +9,11 @@ namespace medulla::sim2d {
 /// disc: phi in (-pi, pi], phi = 0 forward; slab: theta_r in (-pi/2, pi/2), one Profile per side.
 /// Values are averages over the bin (not point values), so that sum(lobe) * w = 1.
 struct Profile {
-    std::vector<double> lobe;    ///< density per radian, normalised to integral 1
-    double energy = 0;           ///< scattered energy per unit incident energy, in [0, 1]
-    double energy_error = 0;     ///< standard error of `energy` (0 where it is a closed form)
-    double standard_error = 0;   ///< relative L2 error of `lobe`: |error| / |lobe| over the bins
-    double mean_length = 0;      ///< mean path length inside the medium of the scattered light [disc radii]
+    std::vector<double> lobe;   ///< density per radian, normalised to integral 1
+    double energy = 0;          ///< scattered energy per unit incident energy, in [0, 1]
+    double energy_error = 0;    ///< standard error of `energy` (0 where it is a closed form)
+    double standard_error = 0;  ///< relative L2 error of `lobe`: |error| / |lobe| over the bins
+    double mean_length = 0;     ///< mean path length inside the medium of the scattered light [disc radii]
 };
 
 }  // namespace medulla::sim2d

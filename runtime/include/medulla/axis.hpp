@@ -1,0 +1,118 @@
+// The one axis type and its one mapping pair: where a value lies among the breakpoints, and the four cubic
+// B-spline weights there. Every stage interpolates with these, offline in double and in a renderer in float.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#include "medulla/config.hpp"
+
+namespace medulla {
+
+/// What an axis measures. The numbers are part of the pack format.
+enum class Quantity : std::uint32_t {
+    sigma = 0,       ///< optical radius of scattering, sigma_ms * kappa / cos theta_t [1], >= 0
+    g = 1,           ///< mean cosine of the phase function [1], in (-1, 1)
+    absorption = 2,  ///< optical radius of absorption [1], >= 0
+    h = 3,           ///< offset in the medulla's cross-section [medulla radii], in [0, 1]
+    theta_i = 4,     ///< inclination of the direction towards the light [radians], in [0, pi/2]
+    phi = 5,         ///< azimuth of exit [radians], periodic, 0 = forward
+    theta_r = 6,     ///< inclination of exit [radians], in [-pi/2, pi/2]
+};
+inline constexpr std::uint32_t quantity_count = 7;
+
+/// The variable in which lobes are smooth, and in which splines run: the quantity itself, but for offsets
+/// tan(asin(h) / 2) = h / (1 + sqrt(1 - h^2)), since lobes have the square-root behaviour of the chord at h = 1.
+template <class T>
+MEDULLA_FN T spline_coordinate(Quantity quantity, T x) noexcept {
+    if (quantity != Quantity::h) return x;
+    return x / (T(1) + std::sqrt((T(1) - x) * (T(1) + x)));
+}
+
+/// Inverse of spline_coordinate.
+template <class T>
+MEDULLA_FN T from_spline_coordinate(Quantity quantity, T c) noexcept {
+    return quantity != Quantity::h ? c : T(2) * c / (T(1) + c * c);
+}
+
+/// A breakpoint and the reciprocals that the de Boor recurrence divides by.
+template <class T>
+struct Knot {
+    T t;         ///< t[i]
+    T inverse1;  ///< 1 / (t[i+1] - t[i])
+    T inverse2;  ///< 1 / (t[i+2] - t[i])
+    T inverse3;  ///< 1 / (t[i+3] - t[i])
+};
+
+/// Ghost breakpoints on either side of the axis; they mirror it, or repeat it where it is periodic.
+inline constexpr std::uint32_t ghost_knots = 2;
+
+/// Breakpoints t[0] < ... < t[spans], spans >= 1, with ghosts: spans + 1 + 2 * ghost_knots knots, unaligned.
+template <class T>
+struct AxisView {
+    const unsigned char* knots;
+    std::uint32_t spans;
+    bool periodic;
+
+    /// Breakpoint i, -2 <= i <= spans + 2.
+    MEDULLA_FN Knot<T> knot(std::int32_t i) const noexcept {
+        Knot<T> k;
+        std::memcpy(&k, knots + sizeof(Knot<T>) * static_cast<std::size_t>(i + std::int32_t(ghost_knots)), sizeof k);
+        return k;
+    }
+    MEDULLA_FN T lower() const noexcept { return knot(0).t; }
+    MEDULLA_FN T upper() const noexcept { return knot(std::int32_t(spans)).t; }
+};
+
+/// A value on an axis: t[span] <= x <= t[span + 1].
+template <class T>
+struct Cell {
+    std::uint32_t span;
+    T x;
+};
+
+/// The cell of `x` (a spline coordinate): wrapped on a periodic axis, else held to the axis's ends. A NaN stays NaN in
+/// `x` and takes span 0, so that it is seen in the result.
+template <class T>
+MEDULLA_FN Cell<T> locate(const AxisView<T>& axis, T x) noexcept {
+    const T lower = axis.lower(), upper = axis.upper();
+    if (axis.periodic) x -= std::floor((x - lower) / (upper - lower)) * (upper - lower);
+    x = x < lower ? lower : (x > upper ? upper : x);
+    std::uint32_t span = 0;
+    for (std::uint32_t n = axis.spans; n > 1;) {
+        const std::uint32_t half = n / 2;
+        span = axis.knot(std::int32_t(span + half)).t <= x ? span + half : span;
+        n -= half;
+    }
+    return {span, x};
+}
+
+/// Inverse of locate.
+template <class T>
+MEDULLA_FN T position(const Cell<T>& cell) noexcept {
+    return cell.x;
+}
+
+/// Weights of the coefficients span .. span + 3; non-negative, sum 1.
+template <class T>
+struct SplineWeights {
+    T w[4];
+};
+
+/// Cubic B-spline basis at a cell (de Boor's recurrence, all denominators are spans of distinct breakpoints).
+template <class T>
+MEDULLA_FN SplineWeights<T> spline_weights(const AxisView<T>& axis, const Cell<T>& cell) noexcept {
+    const auto i = std::int32_t(cell.span);
+    const Knot<T> k_2 = axis.knot(i - 2), k_1 = axis.knot(i - 1), k0 = axis.knot(i);
+    const T k1 = axis.knot(i + 1).t, k2 = axis.knot(i + 2).t, k3 = axis.knot(i + 3).t;
+    const T x = cell.x;
+    const T l1 = x - k0.t, l2 = x - k_1.t, l3 = x - k_2.t, r1 = k1 - x, r2 = k2 - x, r3 = k3 - x;
+    const T n0 = r1 * k0.inverse1, n1 = l1 * k0.inverse1;
+    const T a = n0 * k_1.inverse2, b = n1 * k0.inverse2;
+    const T m0 = r1 * a, m1 = l2 * a + r2 * b, m2 = l1 * b;
+    const T c = m0 * k_2.inverse3, d = m1 * k_1.inverse3, e = m2 * k0.inverse3;
+    return {{r1 * c, l3 * c + r2 * d, l2 * d + r3 * e, l1 * e}};
+}
+
+}  // namespace medulla

@@ -1,0 +1,156 @@
+// Lobes straight from the factors: contract the parameter axes once, then read any number of exit directions.
+// value(x_1 .. x_d, y) = sum over r of scale_r * prod over k of f_kr(x_k) * u_r(y), f and u cubic splines.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "medulla/pack.hpp"
+
+namespace medulla {
+
+/// Where in a table's parameter space: only the axes that the table has are read.
+struct LobeQuery {
+    float sigma = 0;       ///< optical radius of scattering [1], >= 0
+    float g = 0;           ///< mean cosine [1]
+    float h = 0;           ///< offset in the medulla [medulla radii], in [0, 1]
+    float theta_i = 0;     ///< inclination [radians], in [0, pi/2]
+    float absorption = 0;  ///< optical radius of absorption [1], >= 0
+
+    MEDULLA_FN float operator[](Quantity quantity) const noexcept {
+        switch (quantity) {
+            case Quantity::sigma:
+                return sigma;
+            case Quantity::g:
+                return g;
+            case Quantity::absorption:
+                return absorption;
+            case Quantity::h:
+                return h;
+            default:
+                return theta_i;
+        }
+    }
+};
+
+/// The parameter axes contracted: what is left is one spline over the exit direction.
+struct Contraction {
+    alignas(32) float weight[max_rank];  ///< per component, scale included; [0, rank_stride) is set
+    float inverse_integral;              ///< 1 / integral over the exit direction, so that lobes integrate to 1
+};
+
+namespace detail {
+
+/// out[r] = sum over four rows of w[t] * row_t[r], for eight components.
+MEDULLA_FN void blend_rows(const TableView& table, std::uint32_t k, std::uint32_t span, const SplineWeights<float>& w,
+                           std::uint32_t first, float (&out)[rank_multiple]) noexcept {
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) out[r] = 0;
+    for (std::uint32_t t = 0; t < 4; ++t) {
+        std::int16_t q[rank_multiple];
+        std::memcpy(q, table.row(k, span + t) + 2 * first, sizeof q);
+        for (std::uint32_t r = 0; r < rank_multiple; ++r) out[r] += w.w[t] * float(q[r]);
+    }
+}
+
+MEDULLA_FN void load_floats(const TableView& table, std::uint32_t offset, std::uint32_t first,
+                            float (&out)[rank_multiple]) noexcept {
+    std::memcpy(out, table.bytes + offset + 4 * first, sizeof out);
+}
+
+}  // namespace detail
+
+/// Contracts the parameter axes of `table` at `query`; values outside an axis are held to its ends.
+MEDULLA_FN Contraction contract(const TableView& table, const LobeQuery& query) noexcept {
+    Cell<float> cells[max_axes];
+    SplineWeights<float> weights[max_axes];
+    const std::uint32_t axes = table.parameter_axes();
+    for (std::uint32_t k = 0; k < axes; ++k) {
+        const auto quantity = static_cast<Quantity>(table.layout.axes[k].quantity);
+        const AxisView<float> axis = table.axis(k);
+        cells[k] = locate(axis, spline_coordinate(quantity, query[quantity]));
+        weights[k] = spline_weights(axis, cells[k]);
+    }
+    Contraction result;
+    float integral = 0;
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
+        float product[rank_multiple], factor[rank_multiple];
+        detail::load_floats(table, table.layout.scales_offset, first, product);
+        for (std::uint32_t k = 0; k < axes; ++k) {
+            detail::blend_rows(table, k, cells[k].span, weights[k], first, factor);
+            for (std::uint32_t r = 0; r < rank_multiple; ++r) product[r] *= factor[r];
+        }
+        for (std::uint32_t r = 0; r < rank_multiple; ++r) result.weight[first + r] = product[r];
+        if (table.has_exit()) {
+            detail::load_floats(table, table.layout.integrals_offset, first, factor);
+            for (std::uint32_t r = 0; r < rank_multiple; ++r) integral += product[r] * factor[r];
+        }
+    }
+    result.inverse_integral = 1.0f / integral;
+    return result;
+}
+
+/// Density per radian at exit direction y [radians] of a table with an exit axis, before anything is held to >= 0.
+MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contraction, float y) noexcept {
+    const std::uint32_t exit = table.parameter_axes();
+    const AxisView<float> axis = table.axis(exit);
+    const Cell<float> cell = locate(axis, y);
+    const SplineWeights<float> weights = spline_weights(axis, cell);
+    float sum[rank_multiple] = {}, factor[rank_multiple];
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
+        detail::blend_rows(table, exit, cell.span, weights, first, factor);
+        for (std::uint32_t r = 0; r < rank_multiple; ++r) sum[r] += contraction.weight[first + r] * factor[r];
+    }
+    float total = 0;
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) total += sum[r];
+    return total * contraction.inverse_integral;
+}
+
+/// Density per radian, >= 0, with integral 1: a signed low-rank sum dips below 0 where the lobe is nearly 0, and
+/// holding it there lowers the error (docs/accuracy.md gives how far it dips).
+MEDULLA_FN float lobe(const TableView& table, const Contraction& contraction, float y) noexcept {
+    const float value = signed_lobe(table, contraction, y);
+    return value < 0 ? 0.0f : value;  // a NaN stays one
+}
+
+/// Value of a table without an exit axis.
+MEDULLA_FN float scalar(const TableView& table, const Contraction& contraction) noexcept {
+    float total = 0;
+    for (std::uint32_t r = 0; r < table.layout.rank_stride; ++r) total += contraction.weight[r];
+    return total;
+}
+
+/// E = 1 - exp(-2 sigma sqrt(1 - h^2)): energy that the disc scatters of a ray at offset h (physics.md, section 2).
+template <class T>
+MEDULLA_FN T azimuthal_energy(T sigma, T h) noexcept {
+    return -std::expm1(T(-2) * sigma * std::sqrt((T(1) - h) * (T(1) + h)));
+}
+
+/// 1 - exp(-2 sigma / cos theta_i): energy that the slab scatters, both sides together (physics.md, section 3).
+template <class T>
+MEDULLA_FN T longitudinal_energy(T sigma, T theta_i) noexcept {
+    return -std::expm1(T(-2) * sigma / std::cos(theta_i));
+}
+
+/// C^N(phi; sigma, g, h) [1/radian], scattered light only; h in [-1, 1], phi = 0 forward. A `sigma` of 0 gives 0.
+MEDULLA_FN float azimuthal(const PackView& pack, float sigma, float g, float h, float phi,
+                           float absorption = 0) noexcept {
+    const TableView& table = pack[TableKind::azimuthal];
+    const float side = h < 0 ? -1.0f : 1.0f;
+    LobeQuery query;
+    query.sigma = sigma, query.g = g, query.h = side * h, query.absorption = absorption;
+    return azimuthal_energy(sigma, h) * lobe(table, contract(table, query), side * phi);
+}
+
+enum class Side { back, forward };
+
+/// C^M(theta_r; sigma, g, theta_i) of one side, normalised over theta_r in (-pi/2, pi/2) [1/radian].
+MEDULLA_FN float longitudinal(const PackView& pack, Side which, float sigma, float g, float theta_i,
+                              float theta_r) noexcept {
+    const TableView& table = pack[which == Side::back ? TableKind::longitudinal_back : TableKind::longitudinal_forward];
+    const float side = theta_i < 0 ? -1.0f : 1.0f;
+    LobeQuery query;
+    query.sigma = sigma, query.g = g, query.theta_i = side * theta_i;
+    return lobe(table, contract(table, query), side * theta_r);
+}
+
+}  // namespace medulla

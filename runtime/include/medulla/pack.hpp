@@ -1,0 +1,271 @@
+// The pack (.furpack): one flat little-endian blob of low-rank tables, used where it lies. docs/formats.md.
+// A format is a struct: layout, validator, and views that borrow the bytes; nothing is copied or allocated.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "medulla/axis.hpp"
+#include "medulla/config.hpp"
+
+namespace medulla {
+
+inline constexpr char pack_magic[8] = {'F', 'U', 'R', 'P', 'A', 'C', 'K', '\n'};
+inline constexpr std::uint32_t pack_version = 1;
+inline constexpr std::uint32_t max_rank = 160;
+inline constexpr std::uint32_t max_axes = 6;
+inline constexpr std::uint32_t max_spans = 4096;
+inline constexpr std::uint32_t rank_multiple = 8;  ///< rows are padded with zeros to a multiple of this rank
+
+/// The tables a pack can hold. The numbers are part of the format.
+enum class TableKind : std::uint32_t {
+    azimuthal = 0,             ///< C^N / E, axes (sigma, g, [absorption,] h, phi)
+    longitudinal_back = 1,     ///< C^M of the backward side, axes (sigma, g, theta_i, theta_r)
+    longitudinal_forward = 2,  ///< C^M of the forward side, the same axes
+    back_fraction = 3,         ///< share of the slab's scattered energy that leaves backward, axes (sigma, g, theta_i)
+};
+inline constexpr std::uint32_t table_kinds = 4;
+
+struct PackHeader {
+    char magic[8];
+    std::uint32_t version;
+    std::uint32_t table_count;
+    std::uint64_t byte_count;     ///< of the whole pack
+    std::uint64_t checksum;       ///< pack_checksum of the whole pack with this field as 0
+    std::uint32_t tables_offset;  ///< of PackTable[table_count]; every offset is from the pack's first byte
+    std::uint32_t text_offset;    ///< provenance: JSON text, not terminated
+    std::uint32_t text_bytes;
+    std::uint32_t reserved[5];  ///< 0
+};
+static_assert(sizeof(PackHeader) == 64 && offsetof(PackHeader, checksum) == 24);
+
+struct PackAxis {
+    std::uint32_t quantity;      ///< a Quantity
+    std::uint32_t periodic;      ///< 0 or 1
+    std::uint32_t nodes;         ///< nodes (or bins) of the table it was made from, for information
+    std::uint32_t spans;         ///< of the spline
+    std::uint32_t knots_offset;  ///< Knot<float>[spans + 5]
+    std::uint32_t rows_offset;   ///< int16[spans + 3][rank_stride]: spline coefficients, one row per coefficient
+    std::uint32_t reserved[2];   ///< 0
+};
+static_assert(sizeof(PackAxis) == 32);
+
+struct PackTable {
+    std::uint32_t kind;           ///< a TableKind, each at most once
+    std::uint32_t rank;           ///< 1 .. max_rank
+    std::uint32_t rank_stride;    ///< rank rounded up to rank_multiple
+    std::uint32_t axis_count;     ///< 1 .. max_axes; the last one is the exit direction, where there is one
+    std::uint32_t scales_offset;  ///< float[rank_stride]: weight of one unit of int16 in every axis
+    std::uint32_t
+        integrals_offset;  ///< float[rank_stride]: integral of the exit spline of a component; 0: no exit axis
+    float low, high;       ///< least and greatest value of the table it was made from
+    PackAxis axes[max_axes];
+};
+static_assert(sizeof(PackTable) == 224);
+
+/// 64-bit FNV-1a with the header's checksum field read as zeros. Any change of one byte changes it.
+MEDULLA_FN std::uint64_t pack_checksum(const unsigned char* bytes, std::size_t count) noexcept {
+    std::uint64_t hash = 0xcbf29ce484222325u;
+    const std::size_t field = offsetof(PackHeader, checksum);
+    for (std::size_t i = 0; i < count; ++i) {
+        const bool skipped = i >= field && i < field + sizeof(std::uint64_t);
+        hash = (hash ^ (skipped ? 0u : bytes[i])) * 0x100000001b3u;
+    }
+    return hash;
+}
+
+/// One low-rank table where it lies in the pack.
+struct TableView {
+    const unsigned char* bytes = nullptr;  ///< of the pack; null: the pack has no such table
+    PackTable layout = {};
+
+    MEDULLA_FN explicit operator bool() const noexcept { return bytes != nullptr; }
+    MEDULLA_FN AxisView<float> axis(std::uint32_t k) const noexcept {
+        return {bytes + layout.axes[k].knots_offset, layout.axes[k].spans, layout.axes[k].periodic != 0};
+    }
+    /// Row `row` of axis k: int16[rank_stride].
+    MEDULLA_FN const unsigned char* row(std::uint32_t k, std::uint32_t row_index) const noexcept {
+        return bytes + layout.axes[k].rows_offset + std::size_t(row_index) * layout.rank_stride * 2;
+    }
+    MEDULLA_FN bool has_exit() const noexcept { return layout.integrals_offset != 0; }
+    MEDULLA_FN std::uint32_t parameter_axes() const noexcept { return layout.axis_count - (has_exit() ? 1u : 0u); }
+};
+
+/// A validated pack. It borrows the bytes it was opened on.
+struct PackView {
+    TableView tables[table_kinds];
+    const char* text = nullptr;  ///< provenance, JSON
+    std::uint32_t text_bytes = 0;
+
+    MEDULLA_FN const TableView& operator[](TableKind kind) const noexcept {
+        return tables[static_cast<std::uint32_t>(kind)];
+    }
+};
+
+enum class PackStatus {
+    ok,
+    null_pointer,
+    too_short,
+    not_a_pack,
+    other_version,
+    wrong_size,
+    wrong_checksum,
+    bad_table,
+    bad_axis,
+    bad_knots,
+    bad_number,
+    out_of_bounds,
+};
+
+inline const char* describe(PackStatus status) noexcept {
+    switch (status) {
+        case PackStatus::ok:
+            return "ok";
+        case PackStatus::null_pointer:
+            return "no bytes";
+        case PackStatus::too_short:
+            return "shorter than a pack's header";
+        case PackStatus::not_a_pack:
+            return "does not begin with FURPACK";
+        case PackStatus::other_version:
+            return "a pack of another format version";
+        case PackStatus::wrong_size:
+            return "its size is not the byte count in its header";
+        case PackStatus::wrong_checksum:
+            return "its checksum does not match";
+        case PackStatus::bad_table:
+            return "a table's kind, rank or number of axes is outside the format";
+        case PackStatus::bad_axis:
+            return "a table's axes are not those of its kind";
+        case PackStatus::bad_knots:
+            return "an axis's knots do not increase";
+        case PackStatus::bad_number:
+            return "a scale or integral is not finite";
+        case PackStatus::out_of_bounds:
+            return "an offset points outside the pack";
+    }
+    return "unknown status";
+}
+
+struct OpenResult {
+    PackView pack;
+    PackStatus status;
+};
+
+namespace detail {
+
+template <class T>
+MEDULLA_FN T load(const unsigned char* bytes) noexcept {
+    T value;
+    std::memcpy(&value, bytes, sizeof value);
+    return value;
+}
+
+MEDULLA_FN bool finite(float x) noexcept { return x - x == 0.0f; }
+
+MEDULLA_FN bool inside(std::uint64_t offset, std::uint64_t bytes, std::uint64_t total) noexcept {
+    return offset >= sizeof(PackHeader) && offset <= total && bytes <= total - offset;
+}
+
+/// Axes of a kind in their order; absorption may follow g in the azimuthal table.
+MEDULLA_FN bool axes_fit(const PackTable& table) noexcept {
+    const auto kind = static_cast<TableKind>(table.kind);
+    Quantity expected[max_axes] = {Quantity::sigma, Quantity::g};
+    std::uint32_t n = 2;
+    if (kind == TableKind::azimuthal) {
+        if (table.axis_count == 5) expected[n++] = Quantity::absorption;
+        expected[n++] = Quantity::h;
+        expected[n++] = Quantity::phi;
+    } else {
+        expected[n++] = Quantity::theta_i;
+        if (kind != TableKind::back_fraction) expected[n++] = Quantity::theta_r;
+    }
+    if (table.axis_count != n) return false;
+    for (std::uint32_t k = 0; k < n; ++k) {
+        const bool periodic = expected[k] == Quantity::phi;
+        if (table.axes[k].quantity != static_cast<std::uint32_t>(expected[k])) return false;
+        if (table.axes[k].periodic != (periodic ? 1u : 0u)) return false;
+        if (table.axes[k].spans < 1 || table.axes[k].spans > max_spans) return false;
+    }
+    return (table.integrals_offset != 0) == (kind != TableKind::back_fraction);
+}
+
+MEDULLA_FN PackStatus check_knots(const AxisView<float>& axis) noexcept {
+    const auto last = std::int32_t(axis.spans + ghost_knots);
+    for (std::int32_t i = -std::int32_t(ghost_knots); i <= last; ++i) {
+        const Knot<float> k = axis.knot(i);
+        if (!finite(k.t) || !finite(k.inverse1) || !finite(k.inverse2) || !finite(k.inverse3))
+            return PackStatus::bad_knots;
+        if (i < last && !(k.t < axis.knot(i + 1).t)) return PackStatus::bad_knots;
+        // The reciprocals are stored, so they are checked: 1e-4 covers the rounding of differences of close knots.
+        const float inverse[3] = {k.inverse1, k.inverse2, k.inverse3};
+        for (std::int32_t step = 1; step <= 3 && i + step <= last; ++step) {
+            const float product = inverse[step - 1] * (axis.knot(i + step).t - k.t);
+            if (!(product > 0.9999f && product < 1.0001f)) return PackStatus::bad_knots;
+        }
+    }
+    return PackStatus::ok;
+}
+
+MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) noexcept {
+    const PackTable& table = view.layout;
+    if (table.kind >= table_kinds || table.rank < 1 || table.rank > max_rank) return PackStatus::bad_table;
+    if (table.rank_stride != (table.rank + rank_multiple - 1) / rank_multiple * rank_multiple)
+        return PackStatus::bad_table;
+    if (table.axis_count < 1 || table.axis_count > max_axes) return PackStatus::bad_table;
+    if (!axes_fit(table)) return PackStatus::bad_axis;
+    if (!finite(table.low) || !finite(table.high)) return PackStatus::bad_number;
+    for (std::uint32_t k = 0; k < table.axis_count; ++k) {
+        const PackAxis& axis = table.axes[k];
+        const std::uint64_t knot_bytes = std::uint64_t(axis.spans + 1 + 2 * ghost_knots) * sizeof(Knot<float>);
+        const std::uint64_t row_bytes = std::uint64_t(axis.spans + 3) * table.rank_stride * 2;
+        if (!inside(axis.knots_offset, knot_bytes, total)) return PackStatus::out_of_bounds;
+        if (!inside(axis.rows_offset, row_bytes, total)) return PackStatus::out_of_bounds;
+        const PackStatus status = check_knots(view.axis(k));
+        if (status != PackStatus::ok) return status;
+    }
+    const std::uint32_t offsets[2] = {table.scales_offset, table.integrals_offset};
+    for (std::uint32_t i = 0; i < (view.has_exit() ? 2u : 1u); ++i) {
+        if (!inside(offsets[i], std::uint64_t(table.rank_stride) * 4, total)) return PackStatus::out_of_bounds;
+        for (std::uint32_t r = 0; r < table.rank_stride; ++r)
+            if (!finite(load<float>(view.bytes + offsets[i] + 4 * r))) return PackStatus::bad_number;
+    }
+    return PackStatus::ok;
+}
+
+}  // namespace detail
+
+/// Checks every size, offset, axis, knot and number of a pack before anything is used, and gives views into it.
+/// Bytes need no alignment and must outlive the view. Takes about 1 ns per byte.
+inline OpenResult open_pack(const void* data, std::size_t size) noexcept {
+    OpenResult result = {PackView{}, PackStatus::null_pointer};
+    const auto fail = [&](PackStatus status) { return OpenResult{PackView{}, status}; };
+    if (data == nullptr) return result;
+    const auto* bytes = static_cast<const unsigned char*>(data);
+    if (size < sizeof(PackHeader)) return fail(PackStatus::too_short);
+    const auto header = detail::load<PackHeader>(bytes);
+    if (std::memcmp(header.magic, pack_magic, sizeof pack_magic) != 0) return fail(PackStatus::not_a_pack);
+    if (header.version != pack_version) return fail(PackStatus::other_version);
+    if (header.byte_count != size) return fail(PackStatus::wrong_size);
+    if (header.checksum != pack_checksum(bytes, size)) return fail(PackStatus::wrong_checksum);
+    if (header.table_count > table_kinds) return fail(PackStatus::bad_table);
+    if (!detail::inside(header.tables_offset, std::uint64_t(header.table_count) * sizeof(PackTable), size) ||
+        !detail::inside(header.text_offset, header.text_bytes, size))
+        return fail(PackStatus::out_of_bounds);
+    for (std::uint32_t i = 0; i < header.table_count; ++i) {
+        TableView view;
+        view.bytes = bytes;
+        view.layout = detail::load<PackTable>(bytes + header.tables_offset + i * sizeof(PackTable));
+        const PackStatus status = detail::check_table(view, size);
+        if (status != PackStatus::ok) return fail(status);
+        if (result.pack.tables[view.layout.kind]) return fail(PackStatus::bad_table);
+        result.pack.tables[view.layout.kind] = view;
+    }
+    result.pack.text = reinterpret_cast<const char*>(bytes + header.text_offset);
+    result.pack.text_bytes = header.text_bytes;
+    result.status = PackStatus::ok;
+    return result;
+}
+
+}  // namespace medulla

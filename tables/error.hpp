@@ -1,0 +1,19 @@
+// The one error of the offline programs: a sentence that names file, field, expected and found. main() catches it once.
+#pragma once
+
+#include <fmt/core.h>
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace medulla::tables {
+
+class Error : public std::runtime_error {
+  public:
+    template <class... Args>
+    explicit Error(fmt::format_string<Args...> format, Args&&... args)
+        : std::runtime_error(fmt::format(format, std::forward<Args>(args)...)) {}
+};
+
+}  // namespace medulla::tables

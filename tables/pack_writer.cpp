@@ -1,0 +1,104 @@
+#include "tables/pack_writer.hpp"
+
+#include <cmath>
+#include <cstring>
+
+#include "tables/error.hpp"
+
+namespace medulla::tables {
+namespace {
+
+/// Bytes that grow; every part starts on a multiple of 16.
+class Blob {
+  public:
+    template <class T>
+    std::uint32_t append(const T* data, std::size_t count) {
+        bytes_.resize((bytes_.size() + 15) / 16 * 16);
+        const std::size_t offset = bytes_.size();
+        bytes_.resize(offset + count * sizeof(T));
+        if (count > 0) std::memcpy(bytes_.data() + offset, data, count * sizeof(T));
+        return static_cast<std::uint32_t>(offset);
+    }
+    template <class T>
+    void put(std::size_t offset, const T& value) {
+        std::memcpy(bytes_.data() + offset, &value, sizeof value);
+    }
+    std::vector<unsigned char>& bytes() { return bytes_; }
+
+  private:
+    std::vector<unsigned char> bytes_;
+};
+
+PackTable write_table(Blob& blob, const PackedTable& table) {
+    const auto rank = static_cast<std::uint32_t>(table.weights.size());
+    if (rank < 1 || rank > max_rank) throw Error("pack: expected a rank from 1 to {}, found {}", max_rank, rank);
+    const std::uint32_t stride = (rank + rank_multiple - 1) / rank_multiple * rank_multiple;
+    PackTable layout = {};
+    layout.kind = static_cast<std::uint32_t>(table.kind);
+    layout.rank = rank;
+    layout.rank_stride = stride;
+    layout.axis_count = static_cast<std::uint32_t>(table.axes.size());
+    layout.low = table.low;
+    layout.high = table.high;
+    Eigen::VectorXd scales = table.weights;
+    Eigen::VectorXd integrals = Eigen::VectorXd::Zero(rank);
+    for (std::size_t k = 0; k < table.axes.size(); ++k) {
+        const PackedAxis& axis = table.axes[k];
+        const Eigen::MatrixXd rows = axis.spline.stored_rows(axis.coefficients);
+        std::vector<std::int16_t> stored(static_cast<std::size_t>(rows.rows()) * stride, 0);
+        const bool exit = table.has_exit() && k + 1 == table.axes.size();
+        const Eigen::VectorXd basis_integrals = axis.spline.integrals();
+        for (Eigen::Index r = 0; r < rank; ++r) {
+            const double greatest = rows.col(r).cwiseAbs().maxCoeff();
+            const double unit = greatest / 32767;
+            scales[r] *= unit;
+            for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+                const double q = greatest > 0 ? std::nearbyint(rows(i, r) / unit) : 0;
+                stored[static_cast<std::size_t>(i) * stride + static_cast<std::size_t>(r)] =
+                    static_cast<std::int16_t>(q);
+                if (exit && i < basis_integrals.size()) integrals[r] += q * basis_integrals[i];
+            }
+        }
+        const std::vector<Knot<float>> knots = axis.spline.float_knots();
+        PackAxis& out = layout.axes[k];
+        out.quantity = static_cast<std::uint32_t>(axis.quantity);
+        out.periodic = axis.spline.periodic() ? 1 : 0;
+        out.nodes = axis.nodes;
+        out.spans = axis.spline.spans();
+        out.knots_offset = blob.append(knots.data(), knots.size());
+        out.rows_offset = blob.append(stored.data(), stored.size());
+    }
+    const auto floats = [&](const Eigen::VectorXd& values) {
+        std::vector<float> padded(stride, 0.0f);
+        for (Eigen::Index r = 0; r < rank; ++r) padded[static_cast<std::size_t>(r)] = static_cast<float>(values[r]);
+        return blob.append(padded.data(), padded.size());
+    };
+    layout.scales_offset = floats(scales);
+    if (table.has_exit()) layout.integrals_offset = floats(integrals);
+    return layout;
+}
+
+}  // namespace
+
+std::vector<unsigned char> write_pack(const std::vector<PackedTable>& tables, const std::string& provenance) {
+    Blob blob;
+    PackHeader header = {};
+    blob.append(&header, 1);
+    std::vector<PackTable> layouts;
+    for (const PackedTable& table : tables) layouts.push_back(write_table(blob, table));
+    std::memcpy(header.magic, pack_magic, sizeof header.magic);
+    header.version = pack_version;
+    header.table_count = static_cast<std::uint32_t>(layouts.size());
+    header.tables_offset = blob.append(layouts.data(), layouts.size());
+    header.text_bytes = static_cast<std::uint32_t>(provenance.size());
+    header.text_offset = blob.append(provenance.data(), provenance.size());
+    header.byte_count = blob.bytes().size();
+    blob.put(0, header);
+    header.checksum = pack_checksum(blob.bytes().data(), blob.bytes().size());
+    blob.put(0, header);
+    const OpenResult opened = open_pack(blob.bytes().data(), blob.bytes().size());
+    if (opened.status != PackStatus::ok) throw Error("pack: written bytes do not open: {}", describe(opened.status));
+    return std::move(blob.bytes());
+}
+
+}  // namespace medulla::tables

@@ -1,0 +1,55 @@
+// A simulated table in memory: axes, normalised lobes, energies, errors, and where it all comes from.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tables/axis.hpp"
+
+namespace medulla::tables {
+
+/// C^N or C^M on its nodes. The last axis is the exit direction; the others index a lobe ("cell"), row-major.
+/// Azimuthal: sigma, g, [absorption,] h, phi. Longitudinal: sigma, g, theta_i, side, theta_r.
+struct Table {
+    std::string name;                    ///< "azimuthal" or "longitudinal"
+    std::vector<Axis> axes;              ///< in the order of the array
+    std::vector<float> lobe;             ///< [cells][bins] density per radian, bin averages, integral 1
+    std::vector<double> energy;          ///< [cells] scattered energy per unit incident energy
+    std::vector<double> energy_error;    ///< [cells] its standard error (0: closed form)
+    std::vector<double> standard_error;  ///< [cells] relative L2 error of the lobe
+    std::vector<double> mean_length;     ///< [cells] mean path of the scattered light inside the medium [radii]
+    std::string method;                  ///< how it was solved
+    std::uint64_t seed = 0, paths = 0;   ///< of the random methods; 0 otherwise
+
+    const Axis& axis(const std::string& name) const;
+    const Axis& exit() const { return axes.back(); }
+    std::size_t bins() const { return exit().size(); }
+    std::size_t cells() const;
+    const float* lobe_of(std::size_t cell) const { return lobe.data() + cell * bins(); }
+    /// Index of a cell along every axis but the exit, for messages and verification.
+    std::vector<std::size_t> position(std::size_t cell) const;
+    /// "sigma 0.5, g 0.2, h 1" of a cell.
+    std::string describe(std::size_t cell) const;
+    /// Value of a parameter axis at a cell; throws Error if the table has no such axis.
+    double parameter(std::size_t cell, const std::string& axis_name) const;
+    void allocate();  ///< sizes the arrays after the axes
+};
+
+/// What a tables file holds.
+struct Tables {
+    std::optional<Table> azimuthal, longitudinal;
+    std::string program;  ///< name and version of the program that wrote it
+
+    std::vector<const Table*> present() const;
+};
+
+/// Scattered energy of a cell in closed form (both sides together for the slab); no value with an absorption axis.
+std::optional<double> closed_form_energy(const Table& table, std::size_t cell);
+
+/// Lobe of one side of a longitudinal table, or the azimuthal table, as an array [cells of that side][bins].
+std::vector<double> side_lobes(const Table& table, std::size_t side);
+
+}  // namespace medulla::tables

@@ -16,4 +16,10 @@ struct Profile {
     double mean_length = 0;     ///< mean path length inside the medium of the scattered light [disc radii]
 };
 
+/// Both exit lobes of one (sigma, g, theta_i), each normalised to integral 1 over theta_r in (-pi/2, pi/2).
+struct SlabProfile {
+    Profile back;     ///< the side of the light
+    Profile forward;  ///< the far side
+};
+
 }  // namespace medulla::sim2d

@@ -1,0 +1,131 @@
+// furtable compress and furtable diff: make a pack, and say how far one file is from another.
+#include <fmt/core.h>
+
+#include "tables/commands.hpp"
+#include "tables/compress.hpp"
+#include "tables/file.hpp"
+#include "tables/tables_file.hpp"
+
+namespace medulla::tables {
+namespace {
+
+struct CompressWords {
+    std::string file, output, solver = "als";
+    int rank = 16;
+    std::uint64_t seed = 1;
+    bool json = false;
+};
+
+nlohmann::ordered_json to_json(const TableReport& report) {
+    const tensor::CpReport& solve = report.solve;
+    return {{"rank", report.rank},
+            {"solver", solve.solver},
+            {"iterations", solve.iterations},
+            {"stop", tensor::to_string(solve.stop)},
+            {"seconds", solve.seconds},
+            {"relative_l2_of_factors", report.fit_error},
+            {"relative_l2_of_exit_spline", report.exit_error},
+            {"relative_l2_of_input_noise", report.noise},
+            {"least_cosine", solve.degeneracy.least_cosine},
+            {"norm_ratio", solve.degeneracy.norm_ratio}};
+}
+
+void run_compress(const CompressWords& words) {
+    const std::string output =
+        words.output.empty() ? words.file.substr(0, words.file.rfind(".h5")) + ".furpack" : words.output;
+    CompressOptions options;
+    options.rank = words.rank;
+    options.seed = words.seed;
+    const std::string input = words.file.substr(words.file.rfind('/') + 1);
+    const CompressResult result = compress(read_tables(words.file), options, input);
+    write_file(output, result.pack.data(), result.pack.size());
+    if (words.json) {
+        nlohmann::ordered_json json = {{"output", output}, {"bytes", result.pack.size()}, {"seconds", result.seconds}};
+        for (const TableReport& report : result.tables) json["factors"][name_of(report.kind)] = to_json(report);
+        json["errors"] = to_json(result.errors);
+        fmt::print("{}\n", json.dump());
+        return;
+    }
+    for (const TableReport& report : result.tables) {
+        const tensor::CpReport& solve = report.solve;
+        fmt::print("{}: rank {}, {} {} iterations ({}), {:.2f} s; factors {:.3e} relative L2 (exit spline {:.1e}, ",
+                   name_of(report.kind), report.rank, solve.solver, solve.iterations, tensor::to_string(solve.stop),
+                   solve.seconds, report.fit_error, report.exit_error);
+        fmt::print("noise of the table {:.1e}); least cosine {:.3f}, norm ratio {:.1f}\n", report.noise,
+                   solve.degeneracy.least_cosine, solve.degeneracy.norm_ratio);
+    }
+    print(result.errors);
+    fmt::print("{}: {} bytes in {:.2f} s\n", output, result.pack.size(), result.seconds);
+}
+
+struct DiffWords {
+    std::string a, b;
+    bool json = false;
+};
+
+void run_diff(const DiffWords& words) {
+    const auto reference = open_source(words.a), candidate = open_source(words.b);
+    for (const TableKind kind : lobe_kinds) {
+        if (!reference->has(kind) || !candidate->has(kind)) continue;
+        // The candidate must cover the reference's nodes; it is asked at each of them.
+        Parameters low, high;
+        for (const Axis& axis : reference->parameter_axes(kind)) {
+            low.set(axis.name, axis.values.front());
+            high.set(axis.name, axis.values.back());
+        }
+        candidate->check(kind, low, words.b);
+        candidate->check(kind, high, words.b);
+    }
+    const std::vector<LobeError> errors = compare(*reference, *candidate);
+    if (errors.empty()) throw Error("{} and {}: expected a table that both have, found none", words.a, words.b);
+    if (words.json)
+        fmt::print("{}\n", nlohmann::ordered_json{{"errors", to_json(errors)}}.dump());
+    else
+        print(errors);
+}
+
+}  // namespace
+
+nlohmann::ordered_json to_json(const std::vector<LobeError>& errors) {
+    nlohmann::ordered_json json;
+    for (const LobeError& error : errors)
+        json[name_of(error.kind)] = {{"relative_l2", error.relative}, {"worst_lobe", error.worst},
+                                     {"worst_at", error.worst_at},    {"energy_error", error.energy},
+                                     {"least_value", error.least},    {"lobes", error.lobes}};
+    return json;
+}
+
+void print(const std::vector<LobeError>& errors) {
+    fmt::print("{:<22} {:>12} {:>12} {:>14}  {}\n", "lobes", "relative L2", "worst lobe", "energy error", "worst at");
+    for (const LobeError& error : errors)
+        fmt::print("{:<22} {:>12.3e} {:>12.3e} {:>14.1e}  {}\n", name_of(error.kind), error.relative, error.worst,
+                   error.energy, error.worst_at);
+}
+
+void add_compress(CLI::App& app, Action& action) {
+    add_command<CompressWords>(
+        app, action, "compress", "tables.h5 -> low-rank pack",
+        [](CLI::App& command, CompressWords& words) {
+            command.add_option("FILE", words.file, "tables file")->required();
+            command.add_option("-o,--output", words.output, "pack to write (default: FILE with .furpack)");
+            command.add_option("--rank", words.rank, "components of each table")
+                ->check(CLI::Range(1, static_cast<int>(max_rank)))
+                ->capture_default_str();
+            command.add_option("--seed", words.seed, "of the solver's start")->capture_default_str();
+            command.add_flag("--json", words.json, "print one JSON object");
+        },
+        run_compress);
+}
+
+void add_diff(CLI::App& app, Action& action) {
+    add_command<DiffWords>(
+        app, action, "diff", "error of B against A",
+        [](CLI::App& command, DiffWords& words) {
+            command.add_option("A", words.a, "reference: tables file or pack")->required();
+            command.add_option("B", words.b, "tables file or pack")->required();
+            command.add_flag("--json", words.json, "print one JSON object");
+        },
+        run_diff);
+}
+
+}  // namespace medulla::tables

@@ -1,0 +1,217 @@
+// furtable info and furtable verify: what a file holds, and whether it keeps what it promises.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "medulla/lookup.hpp"
+#include "tables/commands.hpp"
+#include "tables/tables_file.hpp"
+
+namespace medulla::tables {
+namespace {
+
+struct FileWords {
+    std::vector<std::string> files;
+    bool json = false;
+};
+
+bool is_tables(const std::string& path) { return path != "default" && is_hdf5(path); }
+
+double median(std::vector<double> values) {
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+    return values[values.size() / 2];
+}
+
+nlohmann::ordered_json axis_json(const Axis& axis) {
+    return {{"name", axis.name}, {"unit", axis_rule(axis.name).unit}, {"nodes", axis.size()}, {"values", axis.values}};
+}
+
+nlohmann::ordered_json info(const std::string& path) {
+    nlohmann::ordered_json json = {{"file", path}};
+    if (is_tables(path)) {
+        const Tables tables = read_tables(path);
+        json["kind"] = "tables";
+        json["program"] = tables.program;
+        for (const Table* table : tables.present()) {
+            nlohmann::ordered_json& out = json["tables"][table->name];
+            out["method"] = table->method;
+            out["seed"] = table->seed;
+            out["paths"] = table->paths;
+            for (const Axis& axis : table->axes) out["axes"].push_back(axis_json(axis));
+            out["standard_error"] = {
+                {"median", median(table->standard_error)},
+                {"worst", *std::max_element(table->standard_error.begin(), table->standard_error.end())}};
+        }
+        return json;
+    }
+    const std::vector<unsigned char> bytes = read_pack(path);
+    const PackView pack = open_pack(bytes.data(), bytes.size()).pack;
+    const auto source = pack_source(bytes, path);
+    json["kind"] = "pack";
+    json["format_version"] = pack_version;
+    json["bytes"] = bytes.size();
+    for (const TableView& table : pack.tables) {
+        if (!table) continue;
+        const auto kind = static_cast<TableKind>(table.layout.kind);
+        nlohmann::ordered_json& out = json["tables"][name_of(kind)];
+        out["rank"] = table.layout.rank;
+        for (const Axis& axis : source->parameter_axes(kind)) out["axes"].push_back(axis_json(axis));
+        if (table.has_exit())
+            out["exit"] = {{"name", exit_name(kind)},
+                           {"bins", source->bins(kind)},
+                           {"spans", table.layout.axes[table.parameter_axes()].spans}};
+    }
+    json["provenance"] = nlohmann::ordered_json::parse(pack.text, pack.text + pack.text_bytes, nullptr, false);
+    return json;
+}
+
+void print_axes(const nlohmann::ordered_json& axes) {
+    for (const auto& axis : axes) {
+        const std::vector<double> values = axis["values"];
+        fmt::print("    {:<10} {:>5} nodes, {:.6g} .. {:.6g} [{}]\n", axis["name"].get<std::string>(), values.size(),
+                   values.front(), values.back(), axis["unit"].get<std::string>());
+    }
+}
+
+void run_info(const FileWords& words) {
+    for (const std::string& file : words.files) {
+        const nlohmann::ordered_json json = info(file);
+        if (words.json) {
+            fmt::print("{}\n", json.dump());
+            continue;
+        }
+        const bool tables = json["kind"] == "tables";
+        fmt::print("{}: {}\n", file,
+                   tables
+                       ? fmt::format("tables, written by {}", json["program"].get<std::string>())
+                       : fmt::format("pack of version {}, {} bytes", pack_version, json["bytes"].get<std::size_t>()));
+        for (const auto& [name, table] : json["tables"].items()) {
+            if (tables)
+                fmt::print(
+                    "  {}: method {}, seed {}, paths {}\n    standard error of a lobe: median {:.2e}, worst {:.2e}\n",
+                    name, table["method"].get<std::string>(), table["seed"].get<std::uint64_t>(),
+                    table["paths"].get<std::uint64_t>(), table["standard_error"]["median"].get<double>(),
+                    table["standard_error"]["worst"].get<double>());
+            else
+                fmt::print("  {}: rank {}\n", name, table["rank"].get<int>());
+            print_axes(table["axes"]);
+            if (table.contains("exit"))
+                fmt::print("    {:<10} {:>5} bins as {} spline spans\n", table["exit"]["name"].get<std::string>(),
+                           table["exit"]["bins"].get<std::size_t>(), table["exit"]["spans"].get<int>());
+        }
+        if (!tables) fmt::print("  provenance: {}\n", json["provenance"].dump());
+    }
+}
+
+// --- verify ------------------------------------------------------------------------------------------------------
+
+/// Relative L2 distance of a lobe from its mirror image.
+double asymmetry(const std::vector<double>& lobe) {
+    double difference = 0, norm = 0;
+    for (std::size_t b = 0; b < lobe.size(); ++b) {
+        const double d = lobe[b] - lobe[lobe.size() - 1 - b];
+        difference += d * d, norm += lobe[b] * lobe[b];
+    }
+    return std::sqrt(difference / norm);
+}
+
+/// Every cell of a table: integral, sign, energy against the closed form, mirror symmetry where the light is head-on.
+void verify_table(const Table& table, const std::string& path) {
+    const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
+    const double width = bin_width(table.exit());
+    for (std::size_t cell = 0; cell < table.cells(); ++cell) {
+        const auto fail = [&](const std::string& what) {
+            throw Error("{}: /{}: {}: {}", path, table.name, table.describe(cell), what);
+        };
+        std::vector<double> lobe(table.lobe_of(cell), table.lobe_of(cell) + table.bins());
+        double sum = 0;
+        for (const double value : lobe) {
+            if (value < 0) fail(fmt::format("expected a density >= 0, found {:g}", value));
+            sum += value * width;
+        }
+        // Sums of float values: each is rounded by 2^-24 relative.
+        if (std::abs(sum - 1) > 1e-6) fail(fmt::format("expected a lobe of integral 1, found {:.9g}", sum));
+        if (!(table.standard_error[cell] >= 0)) fail("expected a standard error >= 0");
+        const double head_on = table.parameter(cell, sides == 2 ? "theta_i" : "h");
+        const double noise = table.standard_error[cell];
+        if (head_on == 0 && asymmetry(lobe) > 5 * std::sqrt(2.0) * noise + 1e-6)
+            fail(fmt::format("expected a mirror-symmetric lobe, found asymmetry {:.2e} at standard error {:.2e}",
+                             asymmetry(lobe), noise));
+        if (cell % sides != 0) continue;
+        const std::optional<double> expected = closed_form_energy(table, cell);
+        if (!expected) continue;
+        double energy = 0, variance = 0;
+        for (std::size_t s = 0; s < sides; ++s) {
+            energy += table.energy[cell + s];
+            variance += table.energy_error[cell + s] * table.energy_error[cell + s];
+        }
+        if (std::abs(energy - *expected) > 5 * std::sqrt(variance) + 1e-12)
+            fail(fmt::format("expected energy {:.9g}, found {:.9g} with standard error {:.2e}", *expected, energy,
+                             std::sqrt(variance)));
+    }
+}
+
+struct Range2 {
+    double least = 0, energy = 0;
+};
+
+/// Every node of a pack: finite, >= 0, integral 1 but for what holding at 0 adds.
+Range2 verify_pack(const Source& pack, const std::string& path) {
+    Range2 range;
+    for (const LobeError& error : compare(pack, pack)) {
+        if (!std::isfinite(error.energy) || !(error.least >= 0))
+            throw Error("{}: {} lobes: expected finite densities >= 0, found {:g} (integral off by {:g})", path,
+                        name_of(error.kind), error.least, error.energy);
+        range.energy = std::max(range.energy, error.energy);
+        range.least = std::min(range.least, error.least);
+    }
+    // A lobe is normalised before its dips below 0 are held there; more than this and the factors are not densities.
+    if (range.energy > 0.1)
+        throw Error("{}: expected lobes of integral 1, found one off by {:.2e}", path, range.energy);
+    return range;
+}
+
+void run_verify(const FileWords& words) {
+    for (const std::string& file : words.files) {
+        if (is_tables(file)) {
+            const Tables tables = read_tables(file);
+            std::size_t cells = 0;
+            for (const Table* table : tables.present()) {
+                verify_table(*table, file);
+                cells += table->cells();
+            }
+            fmt::print("{}: ok: {} cells finite and >= 0, integrals, energies and symmetry as they must be\n", file,
+                       cells);
+        } else {
+            const Range2 range = verify_pack(*pack_source(read_pack(file), file), file);
+            fmt::print("{}: ok: checksum, structure, lobes finite and >= 0; greatest integral error {:.1e}\n", file,
+                       range.energy);
+        }
+    }
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, Action& action) {
+    add_command<FileWords>(
+        app, action, "info", "axes, sizes, errors, provenance",
+        [](CLI::App& command, FileWords& words) {
+            command.add_option("FILE", words.files, "tables file, pack, or 'default': the pack built in")
+                ->required()
+                ->expected(1);
+            command.add_flag("--json", words.json, "print one JSON object");
+        },
+        run_info);
+}
+
+void add_verify(CLI::App& app, Action& action) {
+    add_command<FileWords>(
+        app, action, "verify", "structure, checksums, energies, symmetry, finite, non-negative",
+        [](CLI::App& command, FileWords& words) {
+            command.add_option("FILE", words.files, "tables files and packs")->required();
+        },
+        run_verify);
+}
+
+}  // namespace medulla::tables

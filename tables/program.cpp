@@ -1,0 +1,34 @@
+#include "tables/program.hpp"
+
+#include <cstdio>
+#include <new>
+
+namespace medulla::tables {
+
+int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& action) {
+    const auto complain = [&](const std::string& text) {
+        fmt::print(stderr, "{}: {}\n", app.get_name(), text);
+        std::fflush(stderr);
+    };
+    try {
+        app.parse(argc, argv);
+        action();
+        if (std::fflush(stdout) != 0) throw Error("standard output: cannot be written");
+        return 0;
+    } catch (const CLI::Success& help) {
+        return app.exit(help);
+    } catch (const CLI::ParseError& error) {
+        complain(error.what());
+        return 2;
+    } catch (const UsageError& error) {
+        complain(error.what());
+        return 2;
+    } catch (const std::bad_alloc&) {
+        complain("not enough memory");
+    } catch (const std::exception& error) {
+        complain(error.what());
+    }
+    return 1;
+}
+
+}  // namespace medulla::tables

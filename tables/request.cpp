@@ -1,0 +1,48 @@
+#include "tables/request.hpp"
+
+#include "tables/error.hpp"
+
+namespace medulla::tables {
+
+Method method_of(const std::string& name) {
+    for (const Method m : {Method::automatic, Method::analog, Method::mc, Method::deterministic})
+        if (name == name_of(m)) return m;
+    throw Error("--method: expected auto, analog, mc or deterministic, found '{}'", name);
+}
+
+const char* name_of(Method method) {
+    switch (method) {
+        case Method::automatic:
+            return "auto";
+        case Method::analog:
+            return "analog";
+        case Method::mc:
+            return "mc";
+        case Method::deterministic:
+            return "deterministic";
+    }
+    return "?";
+}
+
+Request default_request() {
+    Request request;
+    request.sigma = graded_axis("sigma", {0, 16, 24});
+    request.g = graded_axis("g", {0, 0.95, 16});
+    request.h = graded_axis("h", {0, 1, 16});
+    request.theta_i = graded_axis("theta_i", {0, pi / 2, 16});
+    return request;
+}
+
+void check_request(const Request& request) {
+    for (const Axis* axis : {&request.sigma, &request.g, &request.h, &request.theta_i}) check_axis(*axis, "request");
+    if (request.sigma.values.back() > 1000)
+        throw Error("--sigma-range: expected at most 1000, found {:g}", request.sigma.values.back());
+    if (request.bins < 8 || request.bins > 4096 || request.bins % 2 != 0)
+        throw Error("--bins: expected an even number from 8 to 4096, found {}", request.bins);
+    if (request.paths < 1 || request.paths > (std::uint64_t{1} << 40))
+        throw Error("--paths: expected 1 to 2^40, found {}", request.paths);
+    if (request.threads < 0 || request.threads > 1024)
+        throw Error("--threads: expected 0 (all) to 1024, found {}", request.threads);
+}
+
+}  // namespace medulla::tables

@@ -1,0 +1,326 @@
+#include "tables/source.hpp"
+
+#include <Eigen/Core>
+#include <cmath>
+#include <map>
+#include <mutex>
+
+#include "medulla/lookup.hpp"
+#include "tables/error.hpp"
+#include "tables/file.hpp"
+#include "tables/spline.hpp"
+#include "tables/tables_file.hpp"
+
+namespace medulla::tables {
+namespace {
+
+std::size_t side_of(TableKind kind) { return kind == TableKind::longitudinal_forward ? 1 : 0; }
+
+/// Lobes of a table between its nodes by the same splines that a pack uses.
+class TableSource : public Source {
+  public:
+    explicit TableSource(Tables tables) : tables_(std::move(tables)) {
+        for (const Table* table : tables_.present())
+            for (const Axis& axis : parameters_of(*table))
+                splines_.emplace(table->name + axis.name, Spline::through(quantity_of(axis.name), axis.values));
+    }
+
+    bool has(TableKind kind) const override { return find(kind) != nullptr; }
+    std::vector<Axis> parameter_axes(TableKind kind) const override { return parameters_of(*find(kind)); }
+    std::size_t bins(TableKind kind) const override { return find(kind)->bins(); }
+
+    std::vector<double> lobe(TableKind kind, const Parameters& at, std::size_t bins) const override {
+        const Table& table = *find(kind);
+        const std::size_t own = table.bins();
+        if (own % bins != 0 && bins % own != 0)
+            throw Error("{} bins asked of a table of {}: one must be a multiple of the other", bins, own);
+        std::vector<double> values(own, 0.0);
+        for_nodes(table, at, [&](std::size_t cell, double weight) {
+            const float* from = table.lobe_of(cell + (table.name == "longitudinal" ? side_of(kind) : 0));
+            for (std::size_t b = 0; b < own; ++b) values[b] += weight * static_cast<double>(from[b]);
+        });
+        std::vector<double> out(bins, 0.0);
+        if (bins <= own) {
+            const std::size_t n = own / bins;
+            for (std::size_t b = 0; b < own; ++b) out[b / n] += values[b] / static_cast<double>(n);
+        } else {
+            for (std::size_t b = 0; b < bins; ++b) out[b] = values[b / (bins / own)];
+        }
+        return out;
+    }
+
+    double back_fraction(const Parameters& at) const override {
+        const Table& table = *tables_.longitudinal;
+        double back = 0, total = 0;
+        for_nodes(table, at, [&](std::size_t cell, double weight) {
+            back += weight * table.energy[cell];
+            total += weight * (table.energy[cell] + table.energy[cell + 1]);
+        });
+        return total > 0 ? back / total : 0.5;  // nothing scattered: there is no share, and no energy to share
+    }
+
+  private:
+    static std::vector<Axis> parameters_of(const Table& table) {
+        std::vector<Axis> list;
+        for (const Axis& axis : table.axes)
+            if (axis.name != "side" && !axis_rule(axis.name).bins) list.push_back(axis);
+        return list;
+    }
+    const Table* find(TableKind kind) const {
+        const auto& table = kind == TableKind::azimuthal ? tables_.azimuthal : tables_.longitudinal;
+        return table ? &*table : nullptr;
+    }
+    /// Calls f(first cell of the node, weight) for every node with a weight; longitudinal nodes own two cells.
+    template <class F>
+    void for_nodes(const Table& table, const Parameters& at, F f) const {
+        const std::vector<Axis> axes = parameters_of(table);
+        std::vector<Eigen::RowVectorXd> weights;
+        for (const Axis& axis : axes) {
+            Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(axis.size()));
+            const double x = at[axis.name];
+            bool exact = false;
+            for (std::size_t i = 0; i < axis.size(); ++i)
+                if (axis.values[i] == x) row[static_cast<Eigen::Index>(i)] = 1, exact = true;
+            const Spline& spline = splines_.at(table.name + axis.name);
+            if (!exact) row = spline.basis(spline_coordinate(quantity_of(axis.name), x)) * spline.from_nodes();
+            weights.push_back(row);
+        }
+        const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
+        const std::size_t nodes = table.cells() / sides;
+        for (std::size_t node = 0; node < nodes; ++node) {
+            double weight = 1;
+            std::size_t rest = node;
+            for (std::size_t k = axes.size(); k-- > 0; rest /= axes[k].size())
+                weight *= weights[k][static_cast<Eigen::Index>(rest % axes[k].size())];
+            if (weight != 0) f(node * sides, weight);
+        }
+    }
+
+    Tables tables_;
+    std::map<std::string, Spline> splines_;
+};
+
+/// Lobes of a pack through the runtime's own contraction.
+class PackSource : public Source {
+  public:
+    PackSource(std::vector<unsigned char> bytes, const std::string& path) : bytes_(std::move(bytes)) {
+        const OpenResult opened = open_pack(bytes_.data(), bytes_.size());
+        if (opened.status != PackStatus::ok) throw Error("{}: expected a pack: {}", path, describe(opened.status));
+        pack_ = opened.pack;
+    }
+
+    bool has(TableKind kind) const override { return static_cast<bool>(pack_[kind]); }
+
+    std::vector<Axis> parameter_axes(TableKind kind) const override {
+        const TableView& table = pack_[kind];
+        std::vector<Axis> list;
+        for (std::uint32_t k = 0; k < table.parameter_axes(); ++k) {
+            const auto quantity = static_cast<Quantity>(table.layout.axes[k].quantity);
+            Axis axis{medulla::tables::name_of(quantity), {}};
+            for (std::uint32_t i = 0; i < table.layout.axes[k].nodes && i <= table.layout.axes[k].spans; ++i)
+                axis.values.push_back(from_spline_coordinate(
+                    quantity, static_cast<double>(table.axis(k).knot(static_cast<std::int32_t>(i)).t)));
+            list.push_back(std::move(axis));
+        }
+        return list;
+    }
+
+    std::size_t bins(TableKind kind) const override {
+        const TableView& table = pack_[kind];
+        return table.layout.axes[table.parameter_axes()].nodes;
+    }
+
+    std::vector<double> lobe(TableKind kind, const Parameters& at, std::size_t bins) const override {
+        const TableView& table = pack_[kind];
+        const Contraction contraction = contract(table, query(at));
+        const std::uint32_t exit = table.parameter_axes(), rows = table.layout.axes[exit].spans + 3;
+        std::vector<double> coefficients(rows, 0.0);
+        for (std::uint32_t j = 0; j < rows; ++j) {
+            const unsigned char* row = table.row(exit, j);
+            for (std::uint32_t r = 0; r < table.layout.rank; ++r)
+                coefficients[j] += static_cast<double>(contraction.weight[r]) * detail::load<std::int16_t>(row + 2 * r);
+            coefficients[j] *= static_cast<double>(contraction.inverse_integral);
+        }
+        const std::vector<Point>& points = gauss_points(kind, bins);
+        std::vector<double> out(bins, 0.0);
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            double value = 0;
+            for (std::uint32_t t = 0; t < 4; ++t) value += points[i].basis[t] * coefficients[points[i].span + t];
+            out[i / 3] += points[i].weight * std::max(value, 0.0);  // what medulla::lobe returns
+        }
+        return out;
+    }
+
+    double back_fraction(const Parameters& at) const override {
+        const TableView& table = pack_[TableKind::back_fraction];
+        if (!table) throw Error("the pack has no table of the slab's energies");
+        return static_cast<double>(scalar(table, contract(table, query(at))));
+    }
+
+  private:
+    struct Point {
+        std::uint32_t span;
+        double basis[4], weight;
+    };
+    static LobeQuery query(const Parameters& at) {
+        LobeQuery q;
+        q.sigma = static_cast<float>(at.sigma), q.g = static_cast<float>(at.g), q.h = static_cast<float>(at.h);
+        q.theta_i = static_cast<float>(at.theta_i), q.absorption = static_cast<float>(at.absorption);
+        return q;
+    }
+    /// Three Gauss points per bin: the basis there, worked out once per number of bins.
+    const std::vector<Point>& gauss_points(TableKind kind, std::size_t bins) const {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        std::vector<Point>& points = points_[{kind, bins}];
+        if (!points.empty()) return points;
+        const TableView& table = pack_[kind];
+        const AxisView<float> axis = table.axis(table.parameter_axes());
+        const double low = static_cast<double>(axis.lower()),
+                     width = (static_cast<double>(axis.upper()) - low) / static_cast<double>(bins);
+        const double node[3] = {0.5 - std::sqrt(0.15), 0.5, 0.5 + std::sqrt(0.15)},
+                     weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+        for (std::size_t b = 0; b < bins; ++b)
+            for (int i = 0; i < 3; ++i) {
+                const auto y = static_cast<float>(low + (static_cast<double>(b) + node[i]) * width);
+                const Cell<float> cell = locate(axis, y);
+                const SplineWeights<float> w = spline_weights(axis, cell);
+                points.push_back({cell.span, {w.w[0], w.w[1], w.w[2], w.w[3]}, weight[i]});
+            }
+        return points;
+    }
+
+    std::vector<unsigned char> bytes_;
+    PackView pack_;
+    mutable std::mutex mutex_;
+    mutable std::map<std::pair<TableKind, std::size_t>, std::vector<Point>> points_;
+};
+
+double norm2(const std::vector<double>& v) {
+    double sum = 0;
+    for (const double x : v) sum += x * x;
+    return sum;
+}
+
+}  // namespace
+
+double Parameters::operator[](const std::string& axis) const {
+    Parameters copy = *this;
+    return *copy.field(axis);
+}
+
+void Parameters::set(const std::string& axis, double value) { *field(axis) = value; }
+
+double* Parameters::field(const std::string& axis) {
+    if (axis == "sigma") return &sigma;
+    if (axis == "g") return &g;
+    if (axis == "h") return &h;
+    if (axis == "theta_i") return &theta_i;
+    if (axis == "absorption") return &absorption;
+    throw Error("axis '{}' is no parameter of a lobe", axis);
+}
+
+const char* name_of(TableKind kind) {
+    switch (kind) {
+        case TableKind::azimuthal:
+            return "azimuthal";
+        case TableKind::longitudinal_back:
+            return "longitudinal back";
+        case TableKind::longitudinal_forward:
+            return "longitudinal forward";
+        case TableKind::back_fraction:
+            return "longitudinal energies";
+    }
+    return "?";
+}
+
+const char* exit_name(TableKind kind) { return kind == TableKind::azimuthal ? "phi" : "theta_r"; }
+
+void Source::check(TableKind kind, const Parameters& at, const std::string& path) const {
+    if (!has(kind)) throw Error("{}: expected a table of {} lobes, found none", path, name_of(kind));
+    for (const Axis& axis : parameter_axes(kind)) {
+        const double x = at[axis.name], low = axis.values.front(), high = axis.values.back();
+        // Packs keep their axes in float: half a unit in its last place is no reason to refuse an end.
+        const double slack = 1e-6 * std::max(std::abs(low), std::abs(high));
+        if (!(x >= low - slack && x <= high + slack))
+            throw Error("{}: {} expected in [{:g}, {:g}], found {:g}", path, axis.name, low, high, x);
+    }
+}
+
+double energy_of(const Source& source, TableKind kind, const Parameters& at) {
+    if (kind == TableKind::azimuthal) return azimuthal_energy(at.sigma, at.h);
+    const double back = source.back_fraction(at), total = longitudinal_energy(at.sigma, at.theta_i);
+    return total * (kind == TableKind::longitudinal_back ? back : 1 - back);
+}
+
+std::unique_ptr<Source> table_source(Tables tables) { return std::make_unique<TableSource>(std::move(tables)); }
+
+std::unique_ptr<Source> pack_source(std::vector<unsigned char> bytes, const std::string& path) {
+    return std::make_unique<PackSource>(std::move(bytes), path);
+}
+
+std::unique_ptr<Source> open_source(const std::string& path) {
+    if (path != "default" && is_hdf5(path)) return table_source(read_tables(path));
+    return pack_source(read_pack(path), path);
+}
+
+std::vector<unsigned char> read_pack(const std::string& path) {
+    std::vector<unsigned char> bytes = read_file(path);
+    const OpenResult opened = open_pack(bytes.data(), bytes.size());
+    if (opened.status != PackStatus::ok)
+        throw Error("{}: expected a tables file (HDF5) or a pack of version {}: {}", path, pack_version,
+                    describe(opened.status));
+    return bytes;
+}
+
+std::vector<LobeError> compare(const Source& reference, const Source& candidate) {
+    std::vector<LobeError> errors;
+    for (const TableKind kind : lobe_kinds) {
+        if (!reference.has(kind) || !candidate.has(kind)) continue;
+        const std::vector<Axis> axes = reference.parameter_axes(kind);
+        const std::size_t bins = reference.bins(kind);
+        LobeError error;
+        error.kind = kind;
+        error.lobes = 1;
+        for (const Axis& axis : axes) error.lobes *= axis.size();
+        std::vector<double> misfit(error.lobes), norm(error.lobes), energy(error.lobes), least(error.lobes);
+        const auto parameters = [&](std::size_t index) {
+            Parameters at;
+            for (std::size_t k = axes.size(); k-- > 0; index /= axes[k].size())
+                at.set(axes[k].name, axes[k].values[index % axes[k].size()]);
+            return at;
+        };
+#pragma omp parallel for schedule(static)
+        for (std::size_t i = 0; i < error.lobes; ++i) {
+            const Parameters at = parameters(i);
+            const std::vector<double> a = reference.lobe(kind, at, bins);
+            std::vector<double> b = candidate.lobe(kind, at, bins);
+            const double width = (kind == TableKind::azimuthal ? 2 * pi : pi) / static_cast<double>(bins);
+            double sum = 0, low = b[0];
+            for (std::size_t j = 0; j < bins; ++j) {
+                sum += b[j];
+                low = std::min(low, b[j]);
+                b[j] -= a[j];
+            }
+            norm[i] = norm2(a), misfit[i] = norm2(b), energy[i] = std::abs(sum * width - 1), least[i] = low;
+        }
+        double total = 0, total_misfit = 0;
+        error.least = least[0];
+        std::size_t worst = 0;
+        for (std::size_t i = 0; i < error.lobes; ++i) {
+            total += norm[i];
+            total_misfit += misfit[i];
+            error.energy = std::max(error.energy, energy[i]);
+            error.least = std::min(error.least, least[i]);
+            if (misfit[i] * norm[worst] > misfit[worst] * norm[i]) worst = i;
+        }
+        error.relative = std::sqrt(total_misfit / total);
+        error.worst = std::sqrt(misfit[worst] / norm[worst]);
+        const Parameters at = parameters(worst);
+        for (const Axis& axis : axes)
+            error.worst_at += fmt::format("{}{} {:g}", error.worst_at.empty() ? "" : ", ", axis.name, at[axis.name]);
+        errors.push_back(error);
+    }
+    return errors;
+}
+
+}  // namespace medulla::tables

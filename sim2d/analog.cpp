@@ -57,6 +57,13 @@ std::size_t bin_of(double angle, double low, double high, std::size_t bins) {
     return static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(b, 0, static_cast<std::ptrdiff_t>(bins) - 1));
 }
 
+/// Standard error of a share of n trials. Half a count more on either side (Jeffreys' prior): 0 or n hits of n are not
+/// certainty.
+double share_error(double hits, double n) {
+    const double q = (hits + 0.5) / (n + 1);
+    return std::sqrt(q * (1 - q) / n);
+}
+
 struct Counts {
     explicit Counts(std::size_t bins) : bin(bins, 0) {}
     std::vector<std::uint64_t> bin;
@@ -124,7 +131,7 @@ Profile trace_disc(double sigma, double g, double h, std::size_t bins, const Tra
     if (options.first == FirstCollision::analog) {
         const auto n = static_cast<double>(options.paths);
         profile.energy = static_cast<double>(counts.total) / n;
-        profile.energy_error = std::sqrt(profile.energy * (1 - profile.energy) / n);
+        profile.energy_error = share_error(static_cast<double>(counts.total), n);
     }
     return profile;
 }
@@ -166,10 +173,10 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
     const bool forced = options.first == FirstCollision::forced;
     const double total = forced ? -std::expm1(-sigma * chord) : scattered / n;
     const auto share = [&](Profile& p, std::uint64_t count) {
-        const double q = scattered > 0 ? static_cast<double>(count) / scattered : 0, e = forced ? q : q * total;
-        p.energy = q * (sigma > 0 ? total : 0);
-        p.energy_error = (forced ? total : 1.0) * std::sqrt(e * (1 - e) / n);
-        if (!(sigma > 0)) p.energy_error = 0;
+        if (!(sigma > 0) || !(scattered > 0)) return;
+        p.energy = static_cast<double>(count) / scattered * total;
+        p.energy_error =
+            forced ? total * share_error(static_cast<double>(count), n) : share_error(static_cast<double>(count), n);
     };
     share(profile.back, back.total);
     share(profile.forward, forward.total);

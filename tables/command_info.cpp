@@ -152,13 +152,13 @@ void verify_table(const Table& table, const std::string& path) {
     }
 }
 
-struct Range2 {
+struct PackBalance {
     double least = 0, energy = 0;
 };
 
 /// Every node of a pack: finite, >= 0, integral 1 but for what holding at 0 adds.
-Range2 verify_pack(const Source& pack, const std::string& path) {
-    Range2 range;
+PackBalance verify_pack(const Source& pack, const std::string& path) {
+    PackBalance range;
     for (const LobeError& error : compare(pack, pack)) {
         if (!std::isfinite(error.energy) || !(error.least >= 0))
             throw Error("{}: {} lobes: expected finite densities >= 0, found {:g} (integral off by {:g})", path,
@@ -184,7 +184,7 @@ void run_verify(const FileWords& words) {
             fmt::print("{}: ok: {} cells finite and >= 0, integrals, energies and symmetry as they must be\n", file,
                        cells);
         } else {
-            const Range2 range = verify_pack(*pack_source(read_pack(file), file), file);
+            const PackBalance range = verify_pack(*pack_source(read_pack(file), file), file);
             fmt::print("{}: ok: checksum, structure, lobes finite and >= 0; greatest integral error {:.1e}\n", file,
                        range.energy);
         }

@@ -76,21 +76,19 @@ struct ArrayType {
     hid_t file, memory;
 };
 
-/// Writes one array; `chunk` empty means contiguous and unfiltered.
+/// Writes one array in chunks, each with a checksum, whatever the compression: no flipped bit is read silently.
 void write_array(hid_t group, const std::string& name, const std::vector<hsize_t>& shape, const ArrayType& type,
                  const void* data, Compression compression, const std::vector<hsize_t>& chunk,
                  const std::string& where) {
     const std::string failed = fmt::format("{}/{}: cannot be written", where, name);
     const Handle properties = untracked(H5P_DATASET_CREATE, where);
-    if (!chunk.empty() && compression != Compression::none) {
-        check(H5Pset_chunk(properties, static_cast<int>(chunk.size()), chunk.data()), failed);
-        check(H5Pset_shuffle(properties), failed);
-        if (compression == Compression::gzip) check(H5Pset_deflate(properties, 6), failed);
-        const unsigned level = zstd_level;
-        if (compression == Compression::zstd)
-            check(H5Pset_filter(properties, zstd_filter_id, H5Z_FLAG_MANDATORY, 1, &level), failed);
-        check(H5Pset_fletcher32(properties), failed);
-    }
+    check(H5Pset_chunk(properties, static_cast<int>(chunk.size()), chunk.data()), failed);
+    if (compression != Compression::none) check(H5Pset_shuffle(properties), failed);
+    if (compression == Compression::gzip) check(H5Pset_deflate(properties, 6), failed);
+    const unsigned level = zstd_level;
+    if (compression == Compression::zstd)
+        check(H5Pset_filter(properties, zstd_filter_id, H5Z_FLAG_MANDATORY, 1, &level), failed);
+    check(H5Pset_fletcher32(properties), failed);
     const Handle space(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr), H5Sclose, failed);
     const Handle set(H5Dcreate2(group, name.c_str(), type.file, space, H5P_DEFAULT, properties, H5P_DEFAULT), H5Dclose,
                      failed);
@@ -127,7 +125,7 @@ void write_table(hid_t file, const Table& table, Compression compression, const 
     std::vector<hsize_t> shape;
     for (const Axis& axis : table.axes) {
         shape.push_back(axis.size());
-        write_array(group, axis.name, {axis.size()}, real64, axis.values.data(), compression, {}, where);
+        write_array(group, axis.name, {axis.size()}, real64, axis.values.data(), compression, {axis.size()}, where);
         const AxisRule& rule = axis_rule(axis.name);
         describe_array(group, axis.name, rule.unit, rule.meaning, where);
         const Handle scale(H5Dopen2(group, axis.name.c_str(), H5P_DEFAULT), H5Dclose, where);

@@ -1,0 +1,153 @@
+// Packs: what is written is what the runtime reads, and what is not a pack is refused with its reason.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "medulla/medulla.hpp"
+#include "tables/pack_writer.hpp"
+
+using namespace medulla;
+using namespace medulla::tables;
+
+namespace {
+
+/// Rank-2 lobes: (1 + sigma g) cos-like bump + (2 - h) constant, exactly representable but for rounding.
+std::vector<unsigned char> small_pack() {
+    const std::vector<double> sigma = {0, 1, 2, 4}, g = {0, 0.5}, h = {0, 0.3, 1};
+    PackedTable table{TableKind::azimuthal, {}, Eigen::VectorXd::Ones(2), 0, 1};
+    const auto parameter = [&](Quantity q, const std::vector<double>& nodes, auto f0, auto f1) {
+        const Spline spline = Spline::through(q, nodes);
+        Eigen::MatrixXd values(static_cast<Eigen::Index>(nodes.size()), 2);
+        for (std::size_t i = 0; i < nodes.size(); ++i)
+            values.row(static_cast<Eigen::Index>(i)) << f0(nodes[i]), f1(nodes[i]);
+        table.axes.push_back({q, static_cast<std::uint32_t>(nodes.size()), spline, spline.from_nodes() * values});
+    };
+    parameter(
+        Quantity::sigma, sigma, [](double x) { return 1 + x; }, [](double) { return 2.0; });
+    parameter(
+        Quantity::g, g, [](double x) { return 1 - x; }, [](double x) { return 1 + x; });
+    parameter(
+        Quantity::h, h, [](double) { return 1.0; }, [](double) { return 0.5; });
+    std::vector<double> breakpoints;
+    for (int i = 0; i <= 8; ++i) breakpoints.push_back(-pi + 2 * pi * i / 8);
+    const Spline exit(breakpoints, true);
+    Eigen::MatrixXd coefficients(exit.size(), 2);
+    for (Eigen::Index j = 0; j < exit.size(); ++j) coefficients.row(j) << 1.5 + std::cos(static_cast<double>(j)), 1.0;
+    table.axes.push_back({Quantity::phi, 36, exit, coefficients});
+    return write_pack({table}, "{\"made\":\"test\"}");
+}
+
+/// Rewrites the checksum after a change, so that the check behind it is reached.
+void seal(std::vector<unsigned char>& bytes) {
+    const std::uint64_t sum = pack_checksum(bytes.data(), bytes.size());
+    std::memcpy(bytes.data() + offsetof(PackHeader, checksum), &sum, sizeof sum);
+}
+
+template <class T>
+void poke(std::vector<unsigned char>& bytes, std::size_t offset, T value) {
+    std::memcpy(bytes.data() + offset, &value, sizeof value);
+}
+
+}  // namespace
+
+TEST_CASE("A pack's lobes are the factors' lobes, and integrate to 1", "[pack]") {
+    const std::vector<unsigned char> bytes = small_pack();
+    const OpenResult opened = open_pack(bytes.data(), bytes.size());
+    REQUIRE(opened.status == PackStatus::ok);
+    const TableView& table = opened.pack[TableKind::azimuthal];
+    REQUIRE(table);
+    CHECK_FALSE(opened.pack[TableKind::longitudinal_back]);
+    CHECK(std::string(opened.pack.text, opened.pack.text_bytes) == "{\"made\":\"test\"}");
+    std::vector<double> breakpoints;
+    for (int i = 0; i <= 8; ++i) breakpoints.push_back(-pi + 2 * pi * i / 8);
+    const Spline exit(breakpoints, true);
+    for (const float sigma : {0.0f, 0.7f, 4.0f})
+        for (const float g : {0.0f, 0.2f, 0.5f}) {
+            LobeQuery query;
+            query.sigma = sigma, query.g = g, query.h = 0.4f;
+            const Contraction contraction = contract(table, query);
+            Eigen::VectorXd c(exit.size());
+            for (Eigen::Index j = 0; j < exit.size(); ++j)
+                c[j] = (1 + double(sigma)) * (1 - double(g)) * (1.5 + std::cos(static_cast<double>(j))) +
+                       2 * (1 + double(g)) * 0.5;
+            c /= exit.integrals().dot(c);
+            double integral = 0;
+            for (int i = 0; i < 1000; ++i) {
+                const double phi = -pi + 2 * pi * (i + 0.5) / 1000;
+                const double value = lobe(table, contraction, static_cast<float>(phi));
+                CHECK(value == Approx(exit.basis(phi).dot(c)).epsilon(1e-4));  // int16: 2^-16 per axis, four axes
+                integral += value * 2 * pi / 1000;
+            }
+            CHECK(integral == Approx(1).epsilon(2e-6));  // float sums of the contraction
+            // h < 0 is the mirror image.
+            CHECK(azimuthal(opened.pack, sigma, g, -0.4f, 1.0f) == azimuthal(opened.pack, sigma, g, 0.4f, -1.0f));
+        }
+    CHECK(azimuthal(opened.pack, 0, 0.2f, 0.1f, 0.3f) == 0);
+    CHECK(std::isnan(azimuthal(opened.pack, 1, std::nanf(""), 0.1f, 0.3f)));
+}
+
+TEST_CASE("Each defect of a pack is refused with its own status", "[pack]") {
+    const std::vector<unsigned char> good = small_pack();
+    const auto status_after = [&](auto change, bool reseal = true) {
+        std::vector<unsigned char> bytes = good;
+        change(bytes);
+        if (reseal && bytes.size() >= sizeof(PackHeader)) seal(bytes);
+        return open_pack(bytes.data(), bytes.size()).status;
+    };
+    PackHeader header;
+    std::memcpy(&header, good.data(), sizeof header);
+    const std::size_t table = header.tables_offset, axis = table + offsetof(PackTable, axes);
+    CHECK(open_pack(nullptr, 0).status == PackStatus::null_pointer);
+    CHECK(status_after([](auto& b) { b.resize(10); }) == PackStatus::too_short);
+    CHECK(status_after([](auto& b) { poke(b, 0, 'X'); }) == PackStatus::not_a_pack);
+    CHECK(status_after([](auto& b) { poke(b, offsetof(PackHeader, version), 99u); }) == PackStatus::other_version);
+    CHECK(status_after([](auto& b) { b.push_back(0); }) == PackStatus::wrong_size);
+    CHECK(status_after([](auto& b) { b.back() ^= 1; }, false) == PackStatus::wrong_checksum);
+    CHECK(status_after([&](auto& b) { poke(b, table + offsetof(PackTable, rank), 1000u); }) == PackStatus::bad_table);
+    CHECK(status_after([&](auto& b) { poke(b, table + offsetof(PackTable, kind), 7u); }) == PackStatus::bad_table);
+    CHECK(status_after([&](auto& b) { poke(b, axis + offsetof(PackAxis, quantity), 6u); }) == PackStatus::bad_axis);
+    CHECK(status_after([&](auto& b) { poke(b, axis + offsetof(PackAxis, rows_offset), 0xfffffff0u); }) ==
+          PackStatus::out_of_bounds);
+    CHECK(status_after([&](auto& b) { poke(b, axis + offsetof(PackAxis, spans), 4000u); }) ==
+          PackStatus::out_of_bounds);
+    CHECK(status_after([&](auto& b) { poke(b, offsetof(PackHeader, text_bytes), 0x7fffffffu); }) ==
+          PackStatus::out_of_bounds);
+    PackTable layout;
+    std::memcpy(&layout, good.data() + table, sizeof layout);
+    CHECK(status_after([&](auto& b) { poke(b, layout.scales_offset, NAN); }) == PackStatus::bad_number);
+    CHECK(status_after([&](auto& b) { poke(b, layout.axes[0].knots_offset, INFINITY); }) == PackStatus::bad_knots);
+    CHECK(status_after([&](auto& b) { poke(b, layout.axes[0].knots_offset + 2 * sizeof(Knot<float>), -5.0f); }) ==
+          PackStatus::bad_knots);
+    for (int s = 0; s <= static_cast<int>(PackStatus::out_of_bounds); ++s)
+        CHECK(std::string(describe(static_cast<PackStatus>(s))) != "unknown status");
+}
+
+TEST_CASE("No changed byte of a pack is read silently", "[pack]") {
+    std::vector<unsigned char> bytes = small_pack();
+    std::mt19937 random(5);
+    for (int i = 0; i < 20000; ++i) {
+        const std::size_t at = random() % bytes.size();
+        const auto flip = static_cast<unsigned char>(1u << (random() % 8));
+        bytes[at] ^= flip;
+        CHECK_FALSE(open_pack(bytes.data(), bytes.size()).status == PackStatus::ok);
+        bytes[at] ^= flip;
+    }
+}
+
+TEST_CASE("Mutated packs with a valid checksum open and look up without leaving their bytes", "[pack]") {
+    const std::vector<unsigned char> good = small_pack();
+    std::mt19937 random(6);
+    int opened_count = 0;
+    for (int i = 0; i < 20000; ++i) {
+        std::vector<unsigned char> bytes = good;
+        for (unsigned n = 1 + random() % 4; n > 0; --n)
+            bytes[random() % bytes.size()] = static_cast<unsigned char>(random());
+        seal(bytes);
+        const OpenResult opened = open_pack(bytes.data(), bytes.size());
+        if (opened.status != PackStatus::ok) continue;
+        ++opened_count;
+        // Whatever the numbers are now, they lie inside the pack (the address sanitizer looks on).
+        (void)azimuthal(opened.pack, 1.5f, 0.3f, 0.2f, 1.0f);
+    }
+    CHECK(opened_count > 0);
+}

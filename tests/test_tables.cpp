@@ -1,0 +1,155 @@
+// Simulation -> tables.h5 -> pack: round trips, determinism, and files that are not what they should be.
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "tables/compress.hpp"
+#include "tables/error.hpp"
+#include "tables/file.hpp"
+#include "tables/simulate.hpp"
+#include "tables/tables_file.hpp"
+
+using namespace medulla;
+using namespace medulla::tables;
+
+namespace {
+
+Request small_request(Method method) {
+    Request request = default_request();
+    request.sigma = graded_axis("sigma", {0, 4, 5});
+    request.g = graded_axis("g", {0, 0.6, 3});
+    request.h = graded_axis("h", {0, 1, 4});
+    request.theta_i = graded_axis("theta_i", {0, 1.2, 3});
+    request.bins = 72;
+    request.paths = 2000;
+    request.method = method;
+    return request;
+}
+
+/// A folder that goes away.
+struct Folder {
+    std::filesystem::path path =
+        std::filesystem::temp_directory_path() / ("medulla_test_" + std::to_string(::getpid()));
+    Folder() { std::filesystem::create_directories(path); }
+    ~Folder() { std::filesystem::remove_all(path); }
+    std::string operator/(const char* name) const { return path / name; }
+};
+
+void check_same(const Table& a, const Table& b) {
+    CHECK(a.lobe == b.lobe);
+    CHECK(a.energy == b.energy);
+    CHECK(a.energy_error == b.energy_error);
+    CHECK(a.standard_error == b.standard_error);
+    CHECK(a.mean_length == b.mean_length);
+    for (std::size_t k = 0; k < a.axes.size(); ++k) CHECK(a.axes[k].values == b.axes[k].values);
+}
+
+}  // namespace
+
+TEST_CASE("Same seed, same values for 1, 2 and 5 threads; another seed, others", "[tables]") {
+    for (const Method method : {Method::mc, Method::automatic}) {
+        Request request = small_request(method);
+        request.threads = 1;
+        const Tables one = simulate(request, ProgressMode::none);
+        for (const int threads : {2, 5}) {
+            request.threads = threads;
+            const Tables other = simulate(request, ProgressMode::none);
+            check_same(*one.azimuthal, *other.azimuthal);
+            check_same(*one.longitudinal, *other.longitudinal);
+        }
+        if (method != Method::mc) continue;
+        request.seed = 2;
+        CHECK(simulate(request, ProgressMode::none).azimuthal->lobe != one.azimuthal->lobe);
+    }
+}
+
+TEST_CASE("A cell's values do not depend on the table around it", "[tables]") {
+    const Tables whole = simulate(small_request(Method::mc), ProgressMode::none);
+    Request part = small_request(Method::mc);
+    part.longitudinal = false;
+    part.sigma = {"sigma", {part.sigma.values[2]}};
+    const Tables alone = simulate(part, ProgressMode::none);
+    const std::size_t slice = alone.azimuthal->lobe.size();
+    CHECK(std::equal(alone.azimuthal->lobe.begin(), alone.azimuthal->lobe.end(),
+                     whole.azimuthal->lobe.begin() + 2 * slice));
+    CHECK_FALSE(alone.longitudinal);
+}
+
+TEST_CASE("Tables files give back what was written, by every compression, with the same bytes twice", "[tables]") {
+    const Folder folder;
+    const Tables tables = simulate(small_request(Method::mc), ProgressMode::none);
+    for (const Compression compression : {Compression::none, Compression::gzip, Compression::zstd}) {
+        const std::string path = folder / "t.h5", again = folder / "u.h5";
+        write_tables(path, tables, compression);
+        write_tables(again, tables, compression);
+        CHECK(read_file(path) == read_file(again));
+        const Tables read = read_tables(path);
+        check_same(*read.azimuthal, *tables.azimuthal);
+        check_same(*read.longitudinal, *tables.longitudinal);
+        CHECK(read.azimuthal->method == tables.azimuthal->method);
+    }
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path))
+        CHECK(entry.path().extension() == ".h5");  // no temporary file is left
+}
+
+TEST_CASE("A damaged tables file is refused, never read as something else", "[tables]") {
+    const Folder folder;
+    const Tables tables = simulate(small_request(Method::mc), ProgressMode::none);
+    const std::string path = folder / "t.h5", broken = folder / "broken.h5";
+    write_tables(path, tables, Compression::zstd);
+    const std::vector<unsigned char> good = read_file(path);
+    int refused = 0;
+    for (std::size_t i = 0; i < 60; ++i) {
+        std::vector<unsigned char> bytes = good;
+        bytes[(i * 7919 + 13) * 31 % bytes.size()] ^= static_cast<unsigned char>(1u << (i % 8));
+        write_file(broken, bytes.data(), bytes.size());
+        try {
+            const Tables read = read_tables(broken);
+            check_same(*read.azimuthal, *tables.azimuthal);  // a flip in unused bytes may pass, if nothing differs
+            check_same(*read.longitudinal, *tables.longitudinal);
+        } catch (const Error&) {
+            ++refused;
+        }
+    }
+    CHECK(refused > 30);
+    CHECK_THROWS_AS(read_tables(folder / "missing.h5"), Error);
+    write_file(broken, good.data(), good.size() / 2);
+    CHECK_THROWS_AS(read_tables(broken), Error);
+    write_file(broken, std::string("not a table"));
+    CHECK_THROWS_AS(read_tables(broken), Error);
+}
+
+TEST_CASE("A pack of a table is the table within the error it reports", "[tables]") {
+    Request request = small_request(Method::automatic);
+    const Tables tables = simulate(request, ProgressMode::none);
+    CompressOptions options;
+    options.rank = 12;
+    const CompressResult result = compress(tables, options, "test");
+    const std::vector<LobeError> errors = compare(*table_source(tables), *pack_source(result.pack, "test"));
+    REQUIRE(errors.size() == 3);
+    REQUIRE(result.tables.size() == 4);
+    for (std::size_t i = 0; i < 3; ++i) {
+        CHECK(errors[i].relative == result.errors[i].relative);
+        CHECK(errors[i].relative < 0.1);
+        CHECK(errors[i].least >= 0);
+        // Normalisation and rounding move the factors' own error only a little.
+        CHECK(errors[i].relative < 1.5 * result.tables[i].fit_error + 1e-3);
+    }
+    const CompressResult again = compress(tables, options, "test");
+    CHECK(again.pack == result.pack);
+}
+
+TEST_CASE("Off its nodes a table is asked through the same splines as a pack", "[tables]") {
+    const Tables tables = simulate(small_request(Method::mc), ProgressMode::none);
+    const auto source = table_source(tables);
+    Parameters at;
+    at.sigma = 1.3, at.g = 0.35, at.h = 0.2;
+    const std::vector<double> lobe = source->lobe(TableKind::azimuthal, at, 72);
+    double sum = 0;
+    for (const double x : lobe) sum += x * 2 * pi / 72;
+    CHECK(sum == Approx(1).epsilon(1e-5));  // weights sum to 1, so integrals of float lobes do
+    CHECK_THROWS_AS((at.sigma = 5, source->check(TableKind::azimuthal, at, "x")), Error);
+}

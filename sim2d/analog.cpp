@@ -178,6 +178,8 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
         p.energy_error =
             forced ? total * share_error(static_cast<double>(count), n) : share_error(static_cast<double>(count), n);
     };
+    // In an empty slab directions along it have no end: the mean of 1 / cos diverges.
+    if (!(sigma > 0)) profile.back.mean_length = profile.forward.mean_length = std::numeric_limits<double>::infinity();
     share(profile.back, back.total);
     share(profile.forward, forward.total);
     return profile;

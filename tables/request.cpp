@@ -34,7 +34,11 @@ Request default_request() {
 }
 
 void check_request(const Request& request) {
-    for (const Axis* axis : {&request.sigma, &request.g, &request.h, &request.theta_i}) check_axis(*axis, "request");
+    const std::pair<const Axis*, const char*> axes[] = {{&request.sigma, "--sigma-range"},
+                                                        {&request.g, "--g-range"},
+                                                        {&request.h, "--h-range"},
+                                                        {&request.theta_i, "--theta-range"}};
+    for (const auto& [axis, option] : axes) check_axis(*axis, option);
     if (request.sigma.values.back() > 1000)
         throw Error("--sigma-range: expected at most 1000, found {:g}", request.sigma.values.back());
     if (request.bins < 8 || request.bins > 4096 || request.bins % 2 != 0)

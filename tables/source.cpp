@@ -5,6 +5,7 @@
 #include <map>
 #include <mutex>
 
+#include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
 #include "tables/error.hpp"
 #include "tables/file.hpp"
@@ -264,6 +265,10 @@ std::unique_ptr<Source> open_source(const std::string& path) {
 }
 
 std::vector<unsigned char> read_pack(const std::string& path) {
+    if (path == "default") {
+        const auto* bytes = reinterpret_cast<const unsigned char*>(default_pack_words);
+        return {bytes, bytes + default_pack_size};
+    }
     std::vector<unsigned char> bytes = read_file(path);
     const OpenResult opened = open_pack(bytes.data(), bytes.size());
     if (opened.status != PackStatus::ok)

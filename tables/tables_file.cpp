@@ -193,7 +193,7 @@ std::string shape_text(const std::vector<hsize_t>& shape) {
 
 template <class T>
 std::vector<T> read_array(hid_t group, const std::string& name, hid_t memory, const std::vector<hsize_t>& expected,
-                          const std::string& where) {
+                          const std::string& where, bool may_be_infinite = false) {
     const std::string failed = fmt::format("{}/{}: cannot be read", where, name);
     const Handle set(H5Dopen2(group, name.c_str(), H5P_DEFAULT), H5Dclose,
                      fmt::format("{}/{}: expected a dataset, found none", where, name));
@@ -218,7 +218,7 @@ std::vector<T> read_array(hid_t group, const std::string& name, hid_t memory, co
     check(H5Dread(set, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()),
           failed + ": its bytes are damaged or its filter is missing");
     for (std::size_t i = 0; i < count; ++i)
-        if (!std::isfinite(values[i]))
+        if (may_be_infinite ? std::isnan(values[i]) : !std::isfinite(values[i]))
             throw Error("{}/{}: expected finite values, found {} as number {}", where, name, values[i], i);
     return values;
 }
@@ -254,7 +254,7 @@ Table read_table(hid_t file, const std::string& name, const std::string& path) {
     table.energy = read_array<double>(group, "energy", H5T_NATIVE_DOUBLE, cells, where);
     table.energy_error = read_array<double>(group, "energy_error", H5T_NATIVE_DOUBLE, cells, where);
     table.standard_error = read_array<double>(group, "standard_error", H5T_NATIVE_DOUBLE, cells, where);
-    table.mean_length = read_array<double>(group, "mean_length", H5T_NATIVE_DOUBLE, cells, where);
+    table.mean_length = read_array<double>(group, "mean_length", H5T_NATIVE_DOUBLE, cells, where, true);
     return table;
 }
 

@@ -4,6 +4,7 @@
 
 #include "medulla/axis.hpp"
 #include "medulla/config.hpp"
+#include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
 #include "medulla/pack.hpp"
 #include "medulla/phase.hpp"

@@ -1,0 +1,63 @@
+// Noise-free solver of the slab table C^M: eigen-modes of the transport equation on graded directions (one
+// decomposition per g serves every sigma), singly scattered light in closed form. docs/physics.md, section 3.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "sim2d/profile.hpp"
+
+namespace medulla::sim2d {
+
+/// Both exit lobes of one (sigma, g, theta_i), each normalised to integral 1 over theta_r in (-pi/2, pi/2).
+struct SlabProfile {
+    Profile back;          ///< the side of the light
+    Profile forward;       ///< the far side
+    double raw_total = 0;  ///< back + forward before it was scaled to the closed form slab_energy: the solver's balance
+};
+
+struct SlabOptions {
+    std::size_t directions = 0;        ///< directions per quarter circle; 0: chosen by g
+    std::size_t max_directions = 320;  ///< above it (|g| > 0.976) the phase function is averaged over cells
+    bool estimate_error = true;        ///< solve again with 0.75 of the directions for the standard errors
+};
+
+/// Solves the slab 0 < x < 2 without absorption for one g. const and free of shared state: threads may share it.
+class SlabSolver {
+  public:
+    /// @param g mean cosine, in (-1, 1)   @throws std::invalid_argument
+    explicit SlabSolver(double g, const SlabOptions& options = {});
+    ~SlabSolver();
+    SlabSolver(SlabSolver&&) noexcept;
+    SlabSolver& operator=(SlabSolver&&) noexcept;
+
+    /// One SlabProfile per theta_i. Lobes are bin averages of the density per radian.
+    /// Where an energy is 0 the lobe is its limit: sigma -> 0 at fixed theta_i gives p over its integral on that side,
+    /// theta_i = pi/2 the light that scatters on the surface.
+    /// standard_error: relative L2 difference between the two resolutions, an upper bound of the finer one's error.
+    /// energy_error: difference of the energies between the resolutions plus the defect of raw_total.
+    /// @param sigma scattering coefficient [1 / radius], finite, >= 0
+    /// @param theta_i inclinations of the light [radians], |theta_i| <= pi/2
+    /// @param bins_per_side bins over (-pi/2, pi/2), >= 1   @throws std::invalid_argument
+    std::vector<SlabProfile> solve(double sigma, const std::vector<double>& theta_i,
+                                   std::size_t bins_per_side = 360) const;
+
+    /// Raw (not normalised) densities at single directions.
+    struct Raw {
+        double back, forward;
+    };
+    /// out[i][r]: raw densities per radian of theta_r at theta_r[r] for light from theta_i[i]; units as in solve.
+    std::vector<std::vector<Raw>> raw(double sigma, const std::vector<double>& theta_i,
+                                      const std::vector<double>& theta_r) const;
+
+    double g() const noexcept;
+    std::size_t directions() const noexcept;  ///< per quarter circle, of the finer resolution
+    bool resolved() const noexcept;           ///< the directions resolve the phase function's peak
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace medulla::sim2d

@@ -96,7 +96,7 @@ RawLobes multiple_scattering(const SlabBins& bins, const Rows& rows, const SlabO
     Eigen::VectorXd weight(Index(bins.theta.size()));
     for (std::size_t r = 0; r < bins.theta.size(); ++r) {
         weight(Index(r)) =
-            bins.weight[r] * bins.mu[r] * -std::expm1(-depth / bins.mu[r]) * double(bins.count) / kPi;
+            bins.weight[r] * -std::expm1(-depth / bins.mu[r]) * double(bins.count) / kPi;
     }
     MatrixXd average(Index(bins.groups.size()), n);
     for (const int parity : {0, 1}) {
@@ -258,7 +258,7 @@ std::vector<std::vector<SlabSolver::Raw>> SlabSolver::raw(double sigma, const st
             for (std::size_t r = 0; r < theta_r.size(); ++r) {
                 const double mu = slab_cosine(theta_r[r]);
                 const bool mirrored = (theta_i[i] >= 0) == (theta_r[r] >= 0);  // travels towards -theta_i
-                const double scale = (mirrored && parity == 1 ? -1 : 1) * mu * -std::expm1(-depth / mu);
+                const double scale = (mirrored && parity == 1 ? -1 : 1) * -std::expm1(-depth / mu);
                 out[i][r].back += scale * back(Index(r), Index(i));
                 out[i][r].forward += scale * forward(Index(r), Index(i));
             }

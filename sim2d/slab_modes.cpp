@@ -200,7 +200,7 @@ SlabOrdinates::Exit SlabOrdinates::multiply_scattered(double depth, const std::v
         }
         const Radiance total = exit_radiance(modes_[parity], depth, mu_i, plus, minus);
         const Eigen::ArrayXd opaque =
-            Eigen::Map<const Eigen::ArrayXd>(d.mu.data(), Index(n)).unaryExpr([&](double mu) { return -std::expm1(-depth / mu); });
+            Eigen::Map<const Eigen::ArrayXd>(d.mu.data(), Index(n)).unaryExpr([&](double mu) { return -std::expm1(-depth / mu) / mu; });
         exit.back[parity] = opaque.inverse().matrix().asDiagonal() * (total.back - single_back);
         exit.forward[parity] = opaque.inverse().matrix().asDiagonal() * (total.forward - single_forward);
     }

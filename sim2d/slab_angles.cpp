@@ -12,9 +12,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kMaxPoints = 12;  ///< per cell of a bin
 
 /// 1 - m(t) with e = 1 - t: the constant and the linear term vanish, so u = (pi/2) (1 - m) has no cancellation.
-double one_minus_map(double e) {
-    return e * e * (21 + e * (-35 + e * (35 + e * (-21 + e * (7 - e))))) / 6;
-}
+double one_minus_map(double e) { return e * e * (21 + e * (-35 + e * (35 + e * (-21 + e * (7 - e))))) / 6; }
 
 /// m'(t) = (7/6) (1 - t^6), with e = 1 - t.
 double map_slope(double e) {
@@ -88,8 +86,8 @@ double slab_t_of(double from_grazing) {
     return 1 - e;
 }
 
-void slab_interpolation_row(const SlabDirections& d, double t, double theta, Parity parity,
-                            Interpolation interpolation, double* row) {
+void slab_interpolation_row(const SlabDirections& d, double t, double theta, Parity parity, Interpolation interpolation,
+                            double* row) {
     const std::size_t n = d.t.size();
     const double sign = parity == Parity::even ? 1 : -1;
     std::fill(row, row + n, 0.0);
@@ -131,15 +129,15 @@ SlabBins slab_bins(std::size_t count, double g) {
     const double pole = g == 0 ? HUGE_VAL : -std::log(std::abs(g));  // distance of the phase function's poles
     std::vector<GaussLegendre> rules;
     for (std::size_t q = 0; q <= kMaxPoints; ++q) rules.push_back(gauss_legendre(q));
-    const auto add = [&](double from, double to) {                   // distances from grazing
+    const auto add = [&](double from, double to) {  // distances from grazing
         const double half = (to - from) / 2;
         const double cells = std::ceil(2 * half / std::min(pole, 2 * half));  // each pole >= 2 half-lengths of its cell
         const double h = half / cells;
         for (double c = 0; c < cells; ++c) {
             const double centre = from + (2 * c + 1) * h;
             // Poles of p beside the cell, the essential singularity exp(-depth / mu) at grazing in line with it.
-            const std::size_t q =
-                std::max(points_for(std::min(pole, 1.0) / h), points_for(std::sqrt(std::max(0.0, (centre / h - 1) * (centre / h + 1)))));
+            const std::size_t q = std::max(points_for(std::min(pole, 1.0) / h),
+                                           points_for(std::sqrt(std::max(0.0, (centre / h - 1) * (centre / h + 1)))));
             const GaussLegendre& rule = rules[q];
             for (std::size_t k = rule.node.size(); k-- > 0;) {
                 const double u = centre + h * rule.node[k];

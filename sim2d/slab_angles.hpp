@@ -41,8 +41,8 @@ struct SlabBins {
         std::size_t upper, lower, first, last;  ///< points [first, last)
     };
     std::vector<Group> groups;
-    std::vector<double> theta, mu, weight;    ///< weight: of the integral over theta
-    std::vector<double> sin_half, cos_half;   ///< of theta / 2
+    std::vector<double> theta, mu, weight;   ///< weight: of the integral over theta
+    std::vector<double> sin_half, cos_half;  ///< of theta / 2
 };
 /// @param g sets how many points a bin needs for the phase function's peak
 SlabBins slab_bins(std::size_t count, double g);

@@ -75,8 +75,7 @@ SlabModes SlabOrdinates::decompose(Parity parity) const {
     }
     // Each row must integrate to 1. What is missing belongs to the peak: the same direction for g > 0, the reversed
     // one (across, mirrored) for g < 0.
-    const VectorXd missing =
-        VectorXd::Ones(n) - (within + within_mirror + across + across_mirror) * weight;
+    const VectorXd missing = VectorXd::Ones(n) - (within + within_mirror + across + across_mirror) * weight;
     (g_ < 0 ? across_mirror : within).diagonal() += missing.cwiseQuotient(weight);
 
     const MatrixXd c = root.asDiagonal() * (within + sign * within_mirror) * root.asDiagonal();
@@ -129,11 +128,12 @@ Radiance exit_radiance(const SlabModes& m, double depth, const std::vector<doubl
     for (Index i = 0; i < count; ++i) {
         const double mu = mu_i[std::size_t(i)];
         for (Index j = 0; j < n; ++j) {
-            alpha(j, i) = (c_sum(j, i) + c_difference(j, i)) / 2 * slab_forward_factor(depth, mu, 1 / m.k(j)) ;
-            beta(j, i) = (c_sum(j, i) - c_difference(j, i)) / 2 * slab_back_factor(depth, mu, 1 / m.k(j)) ;
+            alpha(j, i) = (c_sum(j, i) + c_difference(j, i)) / 2 * slab_forward_factor(depth, mu, 1 / m.k(j));
+            beta(j, i) = (c_sum(j, i) - c_difference(j, i)) / 2 * slab_back_factor(depth, mu, 1 / m.k(j));
         }
     }
-    const VectorXd decay = (-depth * m.k.array()).exp(), lost = -(-depth * m.k.array()).unaryExpr([](double v) { return std::expm1(v); });
+    const VectorXd decay = (-depth * m.k.array()).exp(),
+                   lost = -(-depth * m.k.array()).unaryExpr([](double v) { return std::expm1(v); });
     // Nothing enters: S + D = 0 at 0, S - D = 0 at depth. In x = alpha(0) + beta(depth), y = alpha(0) - beta(depth):
     MatrixXd symmetric = m.sum * (1 + decay.array()).matrix().asDiagonal();
     symmetric += m.difference * lost.asDiagonal();
@@ -199,8 +199,9 @@ SlabOrdinates::Exit SlabOrdinates::multiply_scattered(double depth, const std::v
             }
         }
         const Radiance total = exit_radiance(modes_[parity], depth, mu_i, plus, minus);
-        const Eigen::ArrayXd opaque =
-            Eigen::Map<const Eigen::ArrayXd>(d.mu.data(), Index(n)).unaryExpr([&](double mu) { return -std::expm1(-depth / mu) / mu; });
+        const Eigen::ArrayXd opaque = Eigen::Map<const Eigen::ArrayXd>(d.mu.data(), Index(n)).unaryExpr([&](double mu) {
+            return -std::expm1(-depth / mu) / mu;
+        });
         exit.back[parity] = opaque.inverse().matrix().asDiagonal() * (total.back - single_back);
         exit.forward[parity] = opaque.inverse().matrix().asDiagonal() * (total.forward - single_forward);
     }

@@ -38,9 +38,7 @@ class SlabOrdinates {
     Exit multiply_scattered(double depth, const std::vector<double>& theta_i) const;
 
     const SlabDirections& directions() const noexcept { return directions_; }
-    Interpolation interpolation() const noexcept {
-        return resolved_ ? Interpolation::spectral : Interpolation::linear;
-    }
+    Interpolation interpolation() const noexcept { return resolved_ ? Interpolation::spectral : Interpolation::linear; }
 
   private:
     double g_;

@@ -55,8 +55,8 @@ double slab_single_forward(double sigma, double g, double theta_i, double theta_
 double planar_hg_integral(double a, double b, double g) noexcept {
     // The antiderivative is arg((1 - g) cos(t/2) + i (1 + g) sin(t/2)) / pi; the argument of a quotient has no branch.
     const double cross = (1 - g) * (1 + g) * std::sin((b - a) / 2);
-    const double dot = (1 - g) * (1 - g) * std::cos(a / 2) * std::cos(b / 2) +
-                       (1 + g) * (1 + g) * std::sin(a / 2) * std::sin(b / 2);
+    const double dot =
+        (1 - g) * (1 - g) * std::cos(a / 2) * std::cos(b / 2) + (1 + g) * (1 + g) * std::sin(a / 2) * std::sin(b / 2);
     // b - a = 2 pi: sin is a rounding of 0 of either sign, the angle is pi.
     return std::atan2(std::max(cross, 0.0), dot) / kPi;
 }

@@ -248,7 +248,10 @@ std::vector<SlabProfile> SlabSolver::solve(double sigma, const std::vector<doubl
             const auto coarse = (raw[1].*side).col(Index(i));
             profile.standard_error =
                 order * relative_difference(lobe / raw_energy, coarse / (coarse.sum() * w)) + kRounding;
-            profile.energy_error = order * std::abs(raw_energy - coarse.sum() * w) + std::abs(both - total);
+            // What one side loses by rounding the other gains, and neither more than the smaller one holds.
+            const double smaller = std::min(raw_energy, std::abs(both - raw_energy));
+            profile.energy_error =
+                order * std::abs(raw_energy - coarse.sum() * w) + std::abs(both - total) + kRounding * smaller;
         };
         fill(profiles[i].back, &RawLobes::back);
         fill(profiles[i].forward, &RawLobes::forward);

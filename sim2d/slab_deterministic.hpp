@@ -18,10 +18,12 @@ struct SlabProfile {
 };
 
 struct SlabOptions {
-    std::size_t directions = 0;  ///< directions per quarter circle; 0: chosen by g
-    std::size_t max_directions =
-        480;  ///< where half of what g asks for is more (|g| > 0.99) the phase function is averaged over cells
-    bool estimate_error = true;  ///< solve again with 0.8 of the directions for the standard errors
+    /// Directions per quarter circle; 0: chosen by g.
+    std::size_t directions = 0;
+    /// Where even half of what g asks for is more (|g| > 0.99) the phase function is averaged over cells.
+    std::size_t max_directions = 480;
+    /// Solve again with 0.8 of the directions for the standard errors.
+    bool estimate_error = true;
 };
 
 /// Solves the slab 0 < x < 2 without absorption for one g. const and free of shared state: threads may share it.
@@ -38,10 +40,10 @@ class SlabSolver {
     /// theta_i = pi/2 the light that scatters on the surface.
     /// standard_error: relative L2 difference between the two resolutions, a bound of the finer one's error where the
     /// directions resolve the phase function (times 4, a standard error, where they do not), plus 1e-8 for rounding.
-    /// energy_error: difference of the energies likewise, plus the defect of raw_total. Both 0 without estimate_error.
-    /// mean_length: 0, not computed. (It diverges as log(1 / sigma) for sigma -> 0: light scattered along the slab.)
-    /// Two calls with the same arguments give the same bytes for any number of threads; another set of theta_i beside
-    /// an angle may change its last digits.
+    /// energy_error: difference of the energies likewise, plus the defect of raw_total and 1e-8 of the smaller side.
+    /// Both 0 without estimate_error. mean_length: 0, not computed. (It diverges as log(1 / sigma) for sigma -> 0:
+    /// light scattered along the slab.) Two calls with the same arguments give the same bytes for any number of
+    /// threads; another set of theta_i beside an angle may change its last digits.
     /// @param sigma scattering coefficient [1 / radius], finite, >= 0
     /// @param theta_i inclinations of the light [radians], |theta_i| <= pi/2
     /// @param bins_per_side bins over (-pi/2, pi/2), >= 1   @throws std::invalid_argument

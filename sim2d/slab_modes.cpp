@@ -100,7 +100,9 @@ SlabModes SlabOrdinates::decompose(Parity parity) const {
     MatrixXd b = x_factor.matrixL().solve(MatrixXd(mu.asDiagonal()));
     b = y_factor.matrixL().solve(MatrixXd(b.transpose())).transpose().eval();
     const Eigen::BDCSVD<MatrixXd> svd(b, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    modes.k = svd.singularValues().cwiseInverse();
+    // X, Y <= 2 bound the singular values by min(mu) / 2 from below; where eps max(1/k) exceeds that, they are
+    // rounding.
+    modes.k = svd.singularValues().cwiseMax(mu.minCoeff() / 2).cwiseInverse();
     const MatrixXd s = x_factor.matrixU().solve(svd.matrixU());
     const MatrixXd t = y_factor.matrixU().solve(svd.matrixV());
     const VectorXd inverse_root = root.cwiseInverse();

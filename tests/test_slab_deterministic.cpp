@@ -367,13 +367,29 @@ TEST_CASE("slab error estimate covers the distance to a finer solve", "[slab]") 
                     const Profile &mine = estimate[i].*side, &truth = reference[i].*side;
                     cells += 2;
                     covered += relative_l2(mine.lobe, truth.lobe) <= mine.standard_error;
-                    covered += std::abs(mine.energy - truth.energy) <= mine.energy_error + 1e-12;  // rounding
+                    covered += std::abs(mine.energy - truth.energy) <= mine.energy_error;
                 }
             }
         }
         INFO("g " << g << ": " << covered << " of " << cells);
         // Resolved: a bound. Unresolved: a standard error, which would cover 68 %.
         CHECK(covered >= (a.resolved() ? cells : cells * 9 / 10));
+    }
+}
+
+TEST_CASE("slab results do not depend on the number of threads", "[slab]") {
+    const double g = 0.97;  // 312 directions: wide enough for matrix products that Eigen would split
+    const std::vector<double> theta_i{0.2, 1.0};
+    const auto alone = SlabSolver(g).solve(2, theta_i);
+    std::vector<std::vector<SlabProfile>> together(2);
+#pragma omp parallel for num_threads(2)
+    for (int k = 0; k < 2; ++k) together[std::size_t(k)] = SlabSolver(g).solve(2, theta_i);
+    for (const auto& profiles : together) {
+        for (std::size_t i = 0; i < theta_i.size(); ++i) {
+            CHECK(profiles[i].back.lobe == alone[i].back.lobe);
+            CHECK(profiles[i].forward.lobe == alone[i].forward.lobe);
+            CHECK(profiles[i].forward.energy == alone[i].forward.energy);
+        }
     }
 }
 

@@ -1,0 +1,70 @@
+// Noise-free solver of the slab table C^M: eigen-modes of the transport equation on graded directions (one
+// decomposition per g serves every sigma), singly scattered light in closed form. docs/physics.md, section 3.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "sim2d/profile.hpp"
+
+namespace medulla::sim2d {
+
+/// Both exit lobes of one (sigma, g, theta_i), each normalised to integral 1 over theta_r in (-pi/2, pi/2).
+struct SlabProfile {
+    Profile back;          ///< the side of the light
+    Profile forward;       ///< the far side
+    double raw_total = 0;  ///< back + forward before it was scaled to the closed form slab_energy: the solver's balance
+};
+
+struct SlabOptions {
+    /// Directions per quarter circle; 0: chosen by g.
+    std::size_t directions = 0;
+    /// Where even half of what g asks for is more (|g| > 0.99) the phase function is averaged over cells.
+    std::size_t max_directions = 480;
+    /// Solve again with 0.8 of the directions for the standard errors.
+    bool estimate_error = true;
+};
+
+/// Solves the slab 0 < x < 2 without absorption for one g. const and free of shared state: threads may share it.
+class SlabSolver {
+  public:
+    /// @param g mean cosine, in (-1, 1)   @throws std::invalid_argument
+    explicit SlabSolver(double g, const SlabOptions& options = {});
+    ~SlabSolver();
+    SlabSolver(SlabSolver&&) noexcept;
+    SlabSolver& operator=(SlabSolver&&) noexcept;
+
+    /// One SlabProfile per theta_i. Lobes are bin averages of the density per radian.
+    /// Where an energy is 0 the lobe is its limit: sigma -> 0 at fixed theta_i gives p over its integral on that side,
+    /// theta_i = pi/2 the light that scatters on the surface.
+    /// standard_error: relative L2 difference between the two resolutions, a bound of the finer one's error where the
+    /// directions resolve the phase function (times 4, a standard error, where they do not), plus 1e-8 for rounding.
+    /// energy_error: difference of the energies likewise, plus the defect of raw_total and 1e-8 of the smaller side.
+    /// Both 0 without estimate_error. mean_length: 0, not computed. (It diverges as log(1 / sigma) for sigma -> 0:
+    /// light scattered along the slab.) Two calls with the same arguments give the same bytes for any number of
+    /// threads; another set of theta_i beside an angle may change its last digits.
+    /// @param sigma scattering coefficient [1 / radius], finite, >= 0
+    /// @param theta_i inclinations of the light [radians], |theta_i| <= pi/2
+    /// @param bins_per_side bins over (-pi/2, pi/2), >= 1   @throws std::invalid_argument
+    std::vector<SlabProfile> solve(double sigma, const std::vector<double>& theta_i,
+                                   std::size_t bins_per_side = 360) const;
+
+    /// Raw (not normalised) densities at single directions.
+    struct Raw {
+        double back, forward;
+    };
+    /// out[i][r]: raw densities per radian of theta_r at theta_r[r] for light from theta_i[i]; units as in solve.
+    std::vector<std::vector<Raw>> raw(double sigma, const std::vector<double>& theta_i,
+                                      const std::vector<double>& theta_r) const;
+
+    double g() const noexcept;
+    std::size_t directions() const noexcept;  ///< per quarter circle, of the finer resolution
+    bool resolved() const noexcept;           ///< the directions resolve the phase function's peak
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace medulla::sim2d

@@ -168,7 +168,7 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
         }
     }
     const double width = pi / static_cast<double>(bins_per_side);
-    SlabProfile profile{back.profile(width), forward.profile(width)};
+    SlabProfile profile{back.profile(width), forward.profile(width), 0};
     const auto scattered = static_cast<double>(back.total + forward.total), n = static_cast<double>(options.paths);
     const bool forced = options.first == FirstCollision::forced;
     const double total = forced ? -std::expm1(-sigma * chord) : scattered / n;
@@ -182,6 +182,7 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
     if (!(sigma > 0)) profile.back.mean_length = profile.forward.mean_length = std::numeric_limits<double>::infinity();
     share(profile.back, back.total);
     share(profile.forward, forward.total);
+    profile.raw_total = profile.back.energy + profile.forward.energy;
     return profile;
 }
 

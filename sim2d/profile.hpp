@@ -18,8 +18,9 @@ struct Profile {
 
 /// Both exit lobes of one (sigma, g, theta_i), each normalised to integral 1 over theta_r in (-pi/2, pi/2).
 struct SlabProfile {
-    Profile back;     ///< the side of the light
-    Profile forward;  ///< the far side
+    Profile back;          ///< the side of the light
+    Profile forward;       ///< the far side
+    double raw_total = 0;  ///< back + forward energy before it was scaled to the closed form: a solver's balance
 };
 
 }  // namespace medulla::sim2d

@@ -9,7 +9,6 @@
 #include <string>
 
 #include "medulla/phase.hpp"
-#include "sim2d/serial_eigen.hpp"
 #include "sim2d/slab_angles.hpp"
 #include "sim2d/slab_modes.hpp"
 #include "sim2d/slab_single.hpp"
@@ -173,7 +172,6 @@ SlabSolver::SlabSolver(double g, const SlabOptions& options) : state_(std::make_
     if (!(std::abs(g) < 1)) throw std::invalid_argument("slab: g must lie in (-1, 1)");
     const double wanted = options.directions > 0 ? double(options.directions) : directions_wanted(g);
     const std::size_t n = std::max<std::size_t>(4, std::min(std::size_t(wanted), options.max_directions));
-    const SerialEigen serial;
     state_->g = g;
     state_->options = options;
     // Half of the wanted directions still give the kernel's integrals to 3e-5 and a positive interpolant.
@@ -207,7 +205,6 @@ std::vector<SlabProfile> SlabSolver::solve(double sigma, const std::vector<doubl
         }
         return profiles;
     }
-    const SerialEigen serial;
     const bool usual = bins_per_side == kUsualBins;
     const SlabBins own = usual ? SlabBins{} : slab_bins(bins_per_side, state_->g);
     const SlabBins own_smooth = usual ? SlabBins{} : slab_bins(bins_per_side, smooth_g(state_->g));
@@ -266,7 +263,6 @@ std::vector<std::vector<SlabSolver::Raw>> SlabSolver::raw(double sigma, const st
     check_angles(theta_r);
     std::vector<std::vector<Raw>> out(theta_i.size(), std::vector<Raw>(theta_r.size(), Raw{0, 0}));
     if (!(sigma > 0)) return out;
-    const SerialEigen serial;
     std::vector<double> incident, exits;
     for (double theta : theta_i) incident.push_back(std::abs(theta));
     for (double theta : theta_r) exits.push_back(std::abs(theta));

@@ -10,13 +10,6 @@
 
 namespace medulla::sim2d {
 
-/// Both exit lobes of one (sigma, g, theta_i), each normalised to integral 1 over theta_r in (-pi/2, pi/2).
-struct SlabProfile {
-    Profile back;          ///< the side of the light
-    Profile forward;       ///< the far side
-    double raw_total = 0;  ///< back + forward before it was scaled to the closed form slab_energy: the solver's balance
-};
-
 struct SlabOptions {
     /// Directions per quarter circle; 0: chosen by g.
     std::size_t directions = 0;

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "medulla/phase.hpp"
-#include "sim2d/serial_eigen.hpp"
 #include "sim2d/slab_angles.hpp"
 
 namespace medulla::sim2d {
@@ -14,7 +13,6 @@ namespace medulla::sim2d {
 SlabDoubling slab_doubling(double sigma, double g, std::size_t directions) {
     using Eigen::Index;
     using Eigen::MatrixXd;
-    const SerialEigen serial;
     constexpr double half_pi = 1.57079632679489661923;
     // Layers of at most 5e-7: the box error (h / mu)^2 / 12 is below 1e-8 for mu > 2e-3, rounding grows as eps
     // 2^doublings.

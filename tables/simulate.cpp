@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "sim2d/analog.hpp"
+#include "sim2d/slab_deterministic.hpp"
 #include "tables/error.hpp"
 
 namespace medulla::tables {
@@ -67,13 +68,26 @@ sim2d::TraceOptions trace_options(const Request& request, std::uint64_t cell) {
     return options;
 }
 
+bool noise_free(Method method) { return method == Method::automatic || method == Method::deterministic; }
+
+/// `auto` asks the random tracer where the noise-free solver's own estimate is worse than a thousandth.
+bool wants_paths(Method method, double error) {
+    if (method == Method::deterministic) return false;
+    return method != Method::automatic || error > 1e-3;
+}
+
+void begin(Table& table, const Request& request) {
+    table.method = name_of(request.method);
+    table.seed = request.seed, table.paths = request.paths;
+    if (request.method == Method::deterministic) table.seed = table.paths = 0;
+    table.allocate();
+}
+
 Table simulate_azimuthal(const Request& request, ProgressMode mode) {
     Table table;
     table.name = "azimuthal";
     table.axes = {request.sigma, request.g, request.h, exit_axis("phi", request.bins)};
-    table.method = "mc";
-    table.seed = request.seed, table.paths = request.paths;
-    table.allocate();
+    begin(table, request);
     const std::size_t offsets = request.h.size(), slices = table.cells() / offsets;
     Progress progress(mode, "azimuthal", table.cells());
     parallel(slices, request.threads, [&](std::size_t slice) {
@@ -93,20 +107,32 @@ Table simulate_longitudinal(const Request& request, ProgressMode mode) {
     Table table;
     table.name = "longitudinal";
     table.axes = {request.sigma, request.g, request.theta_i, {"side", {0, 1}}, exit_axis("theta_r", request.bins / 2)};
-    table.method = "mc";
-    table.seed = request.seed, table.paths = request.paths;
-    table.allocate();
+    begin(table, request);
+    const std::vector<double>& g = request.g.values;
     const std::size_t angles = request.theta_i.size(), slices = table.cells() / (2 * angles);
     Progress progress(mode, "longitudinal", table.cells());
+    // What depends on g alone is worked out once and shared by every sigma.
+    std::vector<std::optional<sim2d::SlabSolver>> solvers(g.size());
+    if (noise_free(request.method))
+        parallel(g.size(), request.threads, [&](std::size_t i) { solvers[i].emplace(g[i]); });
     parallel(slices, request.threads, [&](std::size_t slice) {
-        const double sigma = request.sigma.values[slice / request.g.size()],
-                     g = request.g.values[slice % request.g.size()];
+        const double sigma = request.sigma.values[slice / g.size()];
+        const std::size_t ig = slice % g.size();
+        std::vector<sim2d::SlabProfile> solved;
+        if (solvers[ig]) solved = solvers[ig]->solve(sigma, request.theta_i.values, table.bins());
         for (std::size_t i = 0; i < angles; ++i) {
             const double theta_i = request.theta_i.values[i];
-            const sim2d::SlabProfile both = sim2d::trace_slab(sigma, g, theta_i, table.bins(),
-                                                              trace_options(request, cell_key(1, {sigma, g, theta_i})));
-            store(table, 2 * (slice * angles + i), both.back);
-            store(table, 2 * (slice * angles + i) + 1, both.forward);
+            sim2d::SlabProfile both;
+            if (!solved.empty()) both = std::move(solved[i]);
+            const double error = solved.empty() ? 1 : std::max(both.back.standard_error, both.forward.standard_error);
+            if (wants_paths(request.method, error)) {
+                sim2d::SlabProfile traced = sim2d::trace_slab(sigma, g[ig], theta_i, table.bins(),
+                                                              trace_options(request, cell_key(1, {sigma, g[ig], theta_i})));
+                if (std::max(traced.back.standard_error, traced.forward.standard_error) < error) both = std::move(traced);
+            }
+            const std::size_t cell = 2 * (slice * angles + i);
+            store(table, cell, both.back);
+            store(table, cell + 1, both.forward);
             progress.add(2);
         }
     });

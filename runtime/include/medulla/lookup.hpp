@@ -59,33 +59,46 @@ MEDULLA_FN void load_floats(const TableView& table, std::uint32_t offset, std::u
 
 }  // namespace detail
 
+/// weight[r] = scale_r: no axis contracted yet.
+MEDULLA_FN void start_contraction(const TableView& table, float* weight) noexcept {
+    std::memcpy(weight, table.bytes + table.layout.scales_offset, 4 * std::size_t(table.layout.rank_stride));
+}
+
+/// to[r] = from[r] * (factor r of axis k at x), x a value of the axis's quantity; values outside are held to its ends.
+MEDULLA_FN void contract_axis(const TableView& table, std::uint32_t k, float x, const float* from, float* to) noexcept {
+    const AxisView<float> axis = table.axis(k);
+    const auto quantity = static_cast<Quantity>(table.layout.axes[k].quantity);
+    const Cell<float> cell = locate(axis, spline_coordinate(quantity, x));
+    const SplineWeights<float> weights = spline_weights(axis, cell);
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
+        float factor[rank_multiple];
+        detail::blend_rows(table, k, cell.span, weights, first, factor);
+        for (std::uint32_t r = 0; r < rank_multiple; ++r) to[first + r] = from[first + r] * factor[r];
+    }
+}
+
+/// 1 / integral over the exit direction of the contracted lobe. A signed low-rank sum with no positive integral is no
+/// density; it has no light to give and 0 is returned.
+MEDULLA_FN float inverse_integral(const TableView& table, const float* weight) noexcept {
+    float sum[rank_multiple] = {}, total = 0;
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
+        float factor[rank_multiple];
+        detail::load_floats(table, table.layout.integrals_offset, first, factor);
+        for (std::uint32_t r = 0; r < rank_multiple; ++r) sum[r] += weight[first + r] * factor[r];
+    }
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) total += sum[r];
+    return total > 1e-30f && total < 1e30f ? 1.0f / total : 0.0f;
+}
+
 /// Contracts the parameter axes of `table` at `query`; values outside an axis are held to its ends.
 MEDULLA_FN Contraction contract(const TableView& table, const LobeQuery& query) noexcept {
-    Cell<float> cells[max_axes];
-    SplineWeights<float> weights[max_axes];
-    const std::uint32_t axes = table.parameter_axes();
-    for (std::uint32_t k = 0; k < axes; ++k) {
-        const auto quantity = static_cast<Quantity>(table.layout.axes[k].quantity);
-        const AxisView<float> axis = table.axis(k);
-        cells[k] = locate(axis, spline_coordinate(quantity, query[quantity]));
-        weights[k] = spline_weights(axis, cells[k]);
-    }
     Contraction result;
-    float integral = 0;
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
-        float product[rank_multiple], factor[rank_multiple];
-        detail::load_floats(table, table.layout.scales_offset, first, product);
-        for (std::uint32_t k = 0; k < axes; ++k) {
-            detail::blend_rows(table, k, cells[k].span, weights[k], first, factor);
-            for (std::uint32_t r = 0; r < rank_multiple; ++r) product[r] *= factor[r];
-        }
-        for (std::uint32_t r = 0; r < rank_multiple; ++r) result.weight[first + r] = product[r];
-        if (table.has_exit()) {
-            detail::load_floats(table, table.layout.integrals_offset, first, factor);
-            for (std::uint32_t r = 0; r < rank_multiple; ++r) integral += product[r] * factor[r];
-        }
+    start_contraction(table, result.weight);
+    for (std::uint32_t k = 0; k < table.parameter_axes(); ++k) {
+        const auto quantity = static_cast<Quantity>(table.layout.axes[k].quantity);
+        contract_axis(table, k, query[quantity], result.weight, result.weight);
     }
-    result.inverse_integral = 1.0f / integral;
+    result.inverse_integral = table.has_exit() ? inverse_integral(table, result.weight) : 1.0f;
     return result;
 }
 

@@ -4,6 +4,11 @@
 
 #include "medulla/axis.hpp"
 #include "medulla/config.hpp"
+#include "medulla/cross_section.hpp"
+#include "medulla/fur_fibre.hpp"
+#include "medulla/fur_parameters.hpp"
+#include "medulla/gaussian.hpp"
 #include "medulla/lookup.hpp"
 #include "medulla/pack.hpp"
 #include "medulla/phase.hpp"
+#include "medulla/real_math.hpp"

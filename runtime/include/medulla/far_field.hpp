@@ -48,6 +48,7 @@ struct ScatteringNode {
     float offset, side;    ///< |h'| / kappa, sign of h
     float centre[2];       ///< Phi^s_p + pi [radians]
     float A[2][Channels];  ///< energy times the node's share of the range
+    float share[2];        ///< of TTs and TRTs in all lobes' energy there, times the node's share of the range
 };
 
 inline constexpr int most_scattering_nodes = 64;
@@ -244,7 +245,13 @@ MEDULLA_FN float place_panel(FarField<Channels>& far, float a, float b, GaussRul
         const float offset = std::abs(path.h_inside) / parameters.kappa;
         n.offset = offset < 1 ? offset : 1.0f;
         n.side = at.h < 0 ? -1.0f : 1.0f;
+        float sum = 0;
+        for (int lobe = 0; lobe < lobe_count; ++lobe)
+            for (int c = 0; c < Channels; ++c) sum += e.A[lobe][c];
         for (int p = 0; p < 2; ++p) {
+            n.share[p] = 0;
+            for (int c = 0; c < Channels; ++c) n.share[p] += weight * e.A[p + 3][c];
+            n.share[p] = sum > 1e-30f ? n.share[p] / sum : 0.0f;
             n.centre[p] = scattered_centre(p + 1, path.gamma_i, path.gamma_t) + float(pi);
             for (int c = 0; c < Channels; ++c) n.A[p][c] = weight * e.A[p + 3][c], most = std::fmax(most, n.A[p][c]);
         }

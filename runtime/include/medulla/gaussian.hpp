@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 #include "medulla/config.hpp"
 #include "medulla/real_math.hpp"
@@ -103,7 +104,8 @@ MEDULLA_FN T sample(const TruncatedGaussian<T>& gaussian, T u) noexcept {
         (error > T(0) ? high : low) = z;
         const T density = scale * std::exp(reference - T(0.5) * z * z);
         const T next = density > T(0) ? z - error / density : T(0.5) * (low + high);
-        if (std::abs(next - z) < T(1e-6) * (T(1) + std::abs(z)) || high - low < T(1e-7) * (T(1) + std::abs(z))) {
+        // The density falls by e over 1 / nearest where the centre is outside: steps are measured by that.
+        if (std::abs(next - z) * (T(1) + gaussian.nearest) < T(2e-6) || high - low < T(1e-7) * (T(1) + std::abs(z))) {
             z = next > low && next < high ? next : z;
             break;
         }
@@ -113,12 +115,12 @@ MEDULLA_FN T sample(const TruncatedGaussian<T>& gaussian, T u) noexcept {
     return theta < -edge ? -edge : (theta > edge ? edge : theta);
 }
 
-/// `x` less whole turns, in [-pi, pi].
+/// `x` less whole turns, in [-pi, pi]; |x| < 1e9.
 template <class T>
 MEDULLA_FN T wrap_angle(T x) noexcept {
     constexpr T turn = T(2 * pi);
-    using std::floor;
-    const T y = x - turn * floor(x * T(1 / (2 * pi)) + T(0.5));
+    const T turns = x * T(1 / (2 * pi));
+    const T y = x - turn * T(static_cast<std::int32_t>(turns + (turns < T(0) ? T(-0.5) : T(0.5))));
     return y < T(-pi) ? T(-pi) : (y > T(pi) ? T(pi) : y);
 }
 

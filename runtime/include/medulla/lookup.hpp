@@ -45,60 +45,85 @@ struct Contraction {
 
 namespace detail {
 
+/// Eight components side by side: SSE2, which every x86-64 has, or plain floats.
 #if defined(__SSE2__) && !defined(__CUDA_ARCH__) && !defined(__HIP_DEVICE_COMPILE__)
-#define MEDULLA_SSE2 1
-
-/// out[r] = sum over four rows of w[t] * row_t[r], for eight components; rows are `step` bytes apart.
-MEDULLA_FN void blend(const unsigned char* row, std::size_t step, const float* w,
-                      float (&out)[rank_multiple]) noexcept {
-    __m128 low = _mm_setzero_ps(), high = _mm_setzero_ps();
-    for (int t = 0; t < 4; ++t) {
-        const __m128i q = _mm_loadu_si128(reinterpret_cast<const __m128i*>(row + std::size_t(t) * step));
-        const __m128 weight = _mm_set1_ps(w[t]);
-        // A word moved to the upper half and shifted down keeps its sign.
-        low = _mm_add_ps(low, _mm_mul_ps(weight, _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(q, q), 16))));
-        high = _mm_add_ps(high, _mm_mul_ps(weight, _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(q, q), 16))));
-    }
-    _mm_storeu_ps(out, low), _mm_storeu_ps(out + 4, high);
+struct Eight {
+    __m128 low, high;
+};
+MEDULLA_FN Eight zero_eight() noexcept { return {_mm_setzero_ps(), _mm_setzero_ps()}; }
+MEDULLA_FN Eight load_eight(const float* x) noexcept { return {_mm_loadu_ps(x), _mm_loadu_ps(x + 4)}; }
+MEDULLA_FN void store_eight(Eight a, float* x) noexcept { _mm_storeu_ps(x, a.low), _mm_storeu_ps(x + 4, a.high); }
+MEDULLA_FN Eight convert_eight(const unsigned char* row) noexcept {
+    // A word moved to the upper half and shifted down keeps its sign.
+    const __m128i q = _mm_loadu_si128(reinterpret_cast<const __m128i*>(row));
+    return {_mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(q, q), 16)),
+            _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(q, q), 16))};
+}
+MEDULLA_FN Eight times(Eight a, Eight b) noexcept { return {_mm_mul_ps(a.low, b.low), _mm_mul_ps(a.high, b.high)}; }
+MEDULLA_FN Eight times(float a, Eight b) noexcept {
+    const __m128 w = _mm_set1_ps(a);
+    return {_mm_mul_ps(w, b.low), _mm_mul_ps(w, b.high)};
+}
+MEDULLA_FN Eight plus(Eight a, Eight b) noexcept { return {_mm_add_ps(a.low, b.low), _mm_add_ps(a.high, b.high)}; }
+MEDULLA_FN float sum_of(Eight a) noexcept {
+    const __m128 x = _mm_add_ps(a.low, a.high), y = _mm_add_ps(x, _mm_movehl_ps(x, x));
+    return _mm_cvtss_f32(_mm_add_ss(y, _mm_shuffle_ps(y, y, 1)));
 }
 #else
-/// out[r] = sum over four rows of w[t] * row_t[r], for eight components; rows are `step` bytes apart.
-MEDULLA_FN void blend(const unsigned char* row, std::size_t step, const float* w,
-                      float (&out)[rank_multiple]) noexcept {
-    for (std::uint32_t r = 0; r < rank_multiple; ++r) out[r] = 0;
-    for (std::uint32_t t = 0; t < 4; ++t) {
-        std::int16_t q[rank_multiple];
-        std::memcpy(q, row + t * step, sizeof q);
-        for (std::uint32_t r = 0; r < rank_multiple; ++r) out[r] += w[t] * float(q[r]);
-    }
+struct Eight {
+    float x[rank_multiple];
+};
+MEDULLA_FN Eight zero_eight() noexcept { return {}; }
+MEDULLA_FN Eight load_eight(const float* x) noexcept {
+    Eight a;
+    std::memcpy(a.x, x, sizeof a.x);
+    return a;
+}
+MEDULLA_FN void store_eight(const Eight& a, float* x) noexcept { std::memcpy(x, a.x, sizeof a.x); }
+MEDULLA_FN Eight convert_eight(const unsigned char* row) noexcept {
+    std::int16_t q[rank_multiple];
+    std::memcpy(q, row, sizeof q);
+    Eight a;
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) a.x[r] = float(q[r]);
+    return a;
+}
+MEDULLA_FN Eight times(const Eight& a, Eight b) noexcept {
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) b.x[r] *= a.x[r];
+    return b;
+}
+MEDULLA_FN Eight times(float a, Eight b) noexcept {
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) b.x[r] *= a;
+    return b;
+}
+MEDULLA_FN Eight plus(const Eight& a, Eight b) noexcept {
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) b.x[r] += a.x[r];
+    return b;
+}
+MEDULLA_FN float sum_of(const Eight& a) noexcept {
+    const float* x = a.x;
+    return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]));
 }
 #endif
 
-/// The same for rows span .. span + 3 of axis k and the components from `first`.
-MEDULLA_FN void blend_rows(const TableView& table, std::uint32_t k, std::uint32_t span, const SplineWeights<float>& w,
-                           std::uint32_t first, float (&out)[rank_multiple]) noexcept {
-    blend(table.row(k, span) + 2 * first, std::size_t(2) * table.layout.rank_stride, w.w, out);
+/// sum over four rows of w[t] * row_t, for eight components; rows are `step` bytes apart.
+MEDULLA_FN Eight blend(const unsigned char* row, std::size_t step, const SplineWeights<float>& w) noexcept {
+    const Eight a = times(w.w[0], convert_eight(row)), b = times(w.w[1], convert_eight(row + step));
+    const Eight c = times(w.w[2], convert_eight(row + 2 * step)), d = times(w.w[3], convert_eight(row + 3 * step));
+    return plus(plus(a, b), plus(c, d));
 }
 
-MEDULLA_FN void load_floats(const TableView& table, std::uint32_t offset, std::uint32_t first,
-                            float (&out)[rank_multiple]) noexcept {
-    std::memcpy(out, table.bytes + offset + 4 * first, sizeof out);
-}
-
-/// Sum of eight, in pairs.
-MEDULLA_FN float sum_of(const float (&x)[rank_multiple]) noexcept {
-    return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]));
+MEDULLA_FN Eight load_eight(const TableView& table, std::uint32_t offset, std::uint32_t first) noexcept {
+    float x[rank_multiple];
+    std::memcpy(x, table.bytes + offset + 4 * first, sizeof x);
+    return load_eight(x);
 }
 
 /// sum over r of weight[r] * (row `row` of axis k)[r].
 MEDULLA_FN float row_sum(const TableView& table, std::uint32_t k, std::uint32_t row, const float* weight) noexcept {
     const unsigned char* bytes = table.row(k, row);
-    float sum[rank_multiple] = {};
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
-        std::int16_t q[rank_multiple];
-        std::memcpy(q, bytes + 2 * first, sizeof q);
-        for (std::uint32_t r = 0; r < rank_multiple; ++r) sum[r] += weight[first + r] * float(q[r]);
-    }
+    Eight sum = zero_eight();
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple)
+        sum = plus(sum, times(load_eight(weight + first), convert_eight(bytes + 2 * first)));
     return sum_of(sum);
 }
 
@@ -115,22 +140,21 @@ MEDULLA_FN void contract_axis(const TableView& table, std::uint32_t k, float x, 
     const auto quantity = static_cast<Quantity>(table.layout.axes[k].quantity);
     const Cell<float> cell = locate(axis, spline_coordinate(quantity, x));
     const SplineWeights<float> weights = spline_weights(axis, cell);
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
-        float factor[rank_multiple];
-        detail::blend_rows(table, k, cell.span, weights, first, factor);
-        for (std::uint32_t r = 0; r < rank_multiple; ++r) to[first + r] = from[first + r] * factor[r];
+    const unsigned char* row = table.row(k, cell.span);
+    const std::uint32_t stride = table.layout.rank_stride;
+    for (std::uint32_t first = 0; first < stride; first += rank_multiple) {
+        const detail::Eight factor = detail::blend(row + 2 * first, 2 * std::size_t(stride), weights);
+        detail::store_eight(detail::times(detail::load_eight(from + first), factor), to + first);
     }
 }
 
 /// 1 / integral over the exit direction of the contracted lobe. A signed low-rank sum with no positive integral is no
 /// density; it has no light to give and 0 is returned.
 MEDULLA_FN float inverse_integral(const TableView& table, const float* weight) noexcept {
-    float sum[rank_multiple] = {};
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
-        float factor[rank_multiple];
-        detail::load_floats(table, table.layout.integrals_offset, first, factor);
-        for (std::uint32_t r = 0; r < rank_multiple; ++r) sum[r] += weight[first + r] * factor[r];
-    }
+    detail::Eight sum = detail::zero_eight();
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple)
+        sum = detail::plus(sum, detail::times(detail::load_eight(weight + first),
+                                              detail::load_eight(table, table.layout.integrals_offset, first)));
     const float total = detail::sum_of(sum);
     return total > 1e-30f && total < 1e30f ? 1.0f / total : 0.0f;
 }
@@ -153,11 +177,12 @@ MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contract
     const AxisView<float> axis = table.axis(exit);
     const Cell<float> cell = locate(axis, y);
     const SplineWeights<float> weights = spline_weights(axis, cell);
-    float sum[rank_multiple] = {}, factor[rank_multiple];
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
-        detail::blend_rows(table, exit, cell.span, weights, first, factor);
-        for (std::uint32_t r = 0; r < rank_multiple; ++r) sum[r] += contraction.weight[first + r] * factor[r];
-    }
+    const unsigned char* row = table.row(exit, cell.span);
+    const std::uint32_t stride = table.layout.rank_stride;
+    detail::Eight sum = detail::zero_eight();
+    for (std::uint32_t first = 0; first < stride; first += rank_multiple)
+        sum = detail::plus(sum, detail::times(detail::load_eight(contraction.weight + first),
+                                              detail::blend(row + 2 * first, 2 * std::size_t(stride), weights)));
     return detail::sum_of(sum) * contraction.inverse_integral;
 }
 

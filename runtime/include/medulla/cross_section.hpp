@@ -56,7 +56,8 @@ MEDULLA_FN Cuticle<T> cuticle(T layers, T index_excess, T cos_i, T x) noexcept {
     const T Tp = T(4) * (ci * inverse_p) * (x * inverse_p);  // 1 - Rp
     const T ps = T(1) / (T(1) + Rs), pp = T(1) / (T(1) + Rp);
     const T F1 = Rs * ps + Rp * pp, T1 = T(0.5) * (Ts * ps + Tp * pp);  // they add up to 1
-    if (!(layers > T(0))) return {T(0), T(1)};
+    // Fewer layers than 1e-30 would be seen at h = 1 alone, where T1 is 0, and there 1 / (layers F1) may overflow.
+    if (!(layers > T(1e-30))) return {T(0), T(1)};
     const T inverse = T(1) / (T1 + layers * F1);
     return {layers * F1 * inverse, T1 * inverse};
 }

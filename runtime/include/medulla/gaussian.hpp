@@ -23,17 +23,14 @@ MEDULLA_FN T scaled_erfc(T x) noexcept {
     return sum / (x * T(1.7724538509055160));
 }
 
-/// Mass of the standard normal over [a, b], a <= b, divided by exp(-m^2 / 2), m the point of [a, b] nearest to 0.
-/// Kept scaled, a lobe whose centre lies far outside the interval still has a mass that is no underflow.
+/// Mass of the standard normal over [near, near + w], near, w >= 0, divided by exp(-near^2 / 2). Kept scaled, a lobe
+/// whose centre lies far outside the interval still has a mass that is no underflow.
 template <class T>
-MEDULLA_FN T scaled_normal_mass(T a, T b) noexcept {
+MEDULLA_FN T scaled_tail_mass(T near, T w) noexcept {
     constexpr T root_half = T(0.70710678118654752);
-    using std::erf;
-    if (a < T(0) && b > T(0)) return T(0.5) * (erf(b * root_half) - erf(a * root_half));
-    const T near = a < T(0) ? -b : a, far = a < T(0) ? -a : b;
-    // Narrow against its distance: the two tails nearly cancel, so the density is integrated by four Gauss nodes;
-    // exp(-near * w) over near * w <= 1 is then exact to float.
-    const T w = far - near;
+    const T far = near + w;
+    // Short against the tail's length 1 / far: the two tails would cancel, so the density is integrated by four Gauss
+    // nodes, which are exact to float for an exponent that changes by at most 1.
     if (w * (far + T(1)) < T(1)) {
         const T x[2] = {T(0.43056815579702629), T(0.16999052179242813)};
         const T c[2] = {T(0.17392742256872693), T(0.32607257743127307)};
@@ -48,21 +45,29 @@ MEDULLA_FN T scaled_normal_mass(T a, T b) noexcept {
     return T(0.5) * (scaled_erfc(near * root_half) - (tail > T(0) ? tail * scaled_erfc(far * root_half) : T(0)));
 }
 
+/// Mass of the standard normal over [a, b], a <= 0 <= b.
+template <class T>
+MEDULLA_FN T normal_mass(T a, T b) noexcept {
+    constexpr T root_half = T(0.70710678118654752);
+    using std::erf;
+    return T(0.5) * (erf(b * root_half) - erf(a * root_half));
+}
+
 }  // namespace detail
 
 /// Gaussian in theta about `centre`, cut at +-pi/2 and normalised there: its integral over (-pi/2, pi/2) is 1 wherever
 /// the centre lies, so a lobe near grazing keeps its energy.
 template <class T>
 struct TruncatedGaussian {
-    T centre;     ///< [radians]
+    T origin;     ///< the centre or, where that is outside, the edge next to it [radians]
     T deviation;  ///< of the uncut Gaussian [radians], > 0
     T inverse;    ///< 1 / deviation
-    T nearest;    ///< least |z| inside, z = (theta - centre) / deviation: the exponent is kept relative to it
-    T peak;       ///< density at `nearest` [1 / radian]
+    T beyond;     ///< how far the centre lies beyond the edge [deviations], 0 where it is inside
+    T peak;       ///< density at the origin [1 / radian]
 
     MEDULLA_FN T pdf(T theta) const noexcept {
-        const T z = (theta - centre) * inverse;
-        return peak * real_math::exponential(T(-0.5) * (z - nearest) * (z + nearest));
+        const T d = std::abs(theta - origin) * inverse;
+        return peak * real_math::exponential(T(-0.5) * d * (d + T(2) * beyond));
     }
 };
 
@@ -70,48 +75,53 @@ template <class T>
 MEDULLA_FN TruncatedGaussian<T> truncated_gaussian(T centre, T deviation) noexcept {
     constexpr T edge = T(pi / 2);
     const T inverse = T(1) / deviation, a = (-edge - centre) * inverse, b = (edge - centre) * inverse;
-    const T nearest = a > T(0) ? a : (b < T(0) ? -b : T(0));
+    const T density = T(0.39894228040143268) * inverse;
     // Both edges 6 deviations away: all but 2e-9 of the mass is inside, less than float can tell.
-    const T mass = a < T(-6) && b > T(6) ? T(1) : detail::scaled_normal_mass(a, b);
-    return {centre, deviation, inverse, nearest, T(0.39894228040143268) * inverse / mass};
+    if (a < T(-6) && b > T(6)) return {centre, deviation, inverse, T(0), density};
+    if (a <= T(0) && b >= T(0)) return {centre, deviation, inverse, T(0), density / detail::normal_mass(a, b)};
+    const T beyond = a > T(0) ? a : -b;
+    const T mass = detail::scaled_tail_mass(beyond, T(2) * edge * inverse);
+    return {a > T(0) ? -edge : edge, deviation, inverse, beyond, density / mass};
 }
 
-/// Draws theta from the truncated Gaussian: inverts its distribution function by bisection started Newton steps.
+/// Draws theta from the truncated Gaussian: its distribution function inverted by Newton steps kept in a bracket.
 /// @param u uniform in [0, 1)
 template <class T>
 MEDULLA_FN T sample(const TruncatedGaussian<T>& gaussian, T u) noexcept {
     constexpr T edge = T(pi / 2);
-    const T a = (-edge - gaussian.centre) * gaussian.inverse, b = (edge - gaussian.centre) * gaussian.inverse;
-    // Outermost 7.5 deviations hold 3e-14 of the mass: the bracket need not be wider where the centre is inside.
-    T low = a < T(-7.5) && b > T(0) ? T(-7.5) : a, high = b > T(7.5) && a < T(0) ? T(7.5) : b;
-    const T reference = T(0.5) * gaussian.nearest * gaussian.nearest;
-    const T scale = gaussian.peak * gaussian.deviation;  // density in z at `nearest`
-    const T whole = T(0.39894228040143268) / scale;
-    T z = low + u * (high - low);
-    if (gaussian.nearest > T(0)) {  // an exponential tail from the nearer edge is a good start
-        const T v = a > T(0) ? T(1) - u : u;
-        const T step = -std::log(v > T(1e-30) ? v : T(1e-30)) / (gaussian.nearest + T(1));
-        z = a > T(0) ? a + step : b - step;
-    } else {
-        z = T(0) < low ? low : (T(0) > high ? high : T(0));
-    }
+    const bool inside = !(gaussian.beyond > T(0)), mirrored = !inside && gaussian.origin > T(0);
+    // d counts deviations from the origin: of either sign where the centre is inside, else into the interval.
+    const T a = inside ? (-edge - gaussian.origin) * gaussian.inverse : T(0);
+    const T b = inside ? (edge - gaussian.origin) * gaussian.inverse : T(2) * edge * gaussian.inverse;
+    const T scale = gaussian.peak * gaussian.deviation;  // density in d at the origin
+    const T to_share = scale * T(2.5066282746310002);    // from mass of the uncut normal
+    const T v = mirrored ? T(1) - u : u;
+    // 7.5 deviations from the centre hold all but 3e-14.
+    T low = inside && a < T(-7.5) ? T(-7.5) : a, high = inside && b > T(7.5) ? T(7.5) : b;
+    const T left = T(1) - v;
+    T d = inside ? T(0) : -std::log(left > T(1e-30) ? left : T(1e-30)) / (gaussian.beyond + T(1));
     for (int i = 0; i < 60; ++i) {
-        if (!(z > low && z < high)) z = T(0.5) * (low + high);
-        // Mass of [a, z] or of [z, b], whichever side is nearer to its edge, in the scale of `nearest`.
-        const T m = a > T(0) ? a : (z < T(0) ? -z : T(0));
-        const T left = detail::scaled_normal_mass(a, z) * std::exp(reference - T(0.5) * m * m);
-        const T error = left / whole - u;
-        (error > T(0) ? high : low) = z;
-        const T density = scale * std::exp(reference - T(0.5) * z * z);
-        const T next = density > T(0) ? z - error / density : T(0.5) * (low + high);
-        // The density falls by e over 1 / nearest where the centre is outside: steps are measured by that.
-        if (std::abs(next - z) * (T(1) + gaussian.nearest) < T(2e-6) || high - low < T(1e-7) * (T(1) + std::abs(z))) {
-            z = next > low && next < high ? next : z;
-            break;
+        if (!(d > low && d < high)) d = T(0.5) * (low + high);
+        T share;
+        if (!inside) {
+            share = to_share * detail::scaled_tail_mass(gaussian.beyond, d);
+        } else if (d >= T(0)) {
+            share = to_share * detail::normal_mass(a, d);
+        } else {
+            share = T(1) - to_share * detail::normal_mass(d, b);
+            // Far from the other edge the left tail is known better by itself.
+            if (a < T(-5)) share = to_share * T(0.5) * std::erfc(-d * T(0.70710678118654752));
         }
-        z = next;
+        const T error = share - v;
+        (error > T(0) ? high : low) = d;
+        const T density = scale * std::exp(T(-0.5) * d * (d + T(2) * gaussian.beyond));
+        const T next = density > T(0) ? d - error / density : T(0.5) * (low + high);
+        // The density falls by e over 1 / beyond where the centre is outside: steps are measured by that.
+        const bool done = std::abs(next - d) * (T(1) + gaussian.beyond) < T(2e-6) || high - low < T(1e-7) * std::abs(d);
+        d = next > low && next < high ? next : (done ? d : T(0.5) * (low + high));
+        if (done) break;
     }
-    const T theta = gaussian.centre + gaussian.deviation * z;
+    const T theta = gaussian.origin + (mirrored ? -gaussian.deviation : gaussian.deviation) * d;
     return theta < -edge ? -edge : (theta > edge ? edge : theta);
 }
 

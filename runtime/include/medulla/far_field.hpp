@@ -54,7 +54,7 @@ struct ScatteringNode {
 inline constexpr int most_scattering_nodes = 64;
 
 /// The fibre lit from theta_i over a range of offsets; a function of the exit (theta_r, phi). One offset alone
-/// (low == high) is the near field.
+/// (low == high, or nearly) is the near field.
 template <int Channels = 3>
 struct FarField {
     NearField<Channels> near;  ///< its longitudinal part, and the whole of it for a range of one offset
@@ -307,9 +307,11 @@ MEDULLA_FN void far_field(const FurFibre<Channels>& fibre, float theta_i, Offset
     // sin b - sin a from the angles that are integrated over, so that a short range loses no digits.
     const float width = 2 * real_math::sine_cosine(0.5f * (far.gamma_low + far.gamma_high)).cosine *
                         real_math::sine_cosine(0.5f * (far.gamma_high - far.gamma_low)).sine;
-    far.single = !(width > 0);
+    // Over 1e-6 radians a lobe's exit moves by at most 4e-6, 0.04 of the narrowest deviation: the middle is its mean to
+    // 0.04^2 / 24.
+    far.single = !(far.gamma_high - far.gamma_low > 1e-6f);
     if (far.single) {
-        offset_at(far.near, range.low);
+        offset_at(far.near, 0.5f * (range.low + range.high));
         return;
     }
     far.inverse_width = 1 / width;

@@ -18,6 +18,8 @@ void add_verify(CLI::App& app, Action& action);
 void add_diff(CLI::App& app, Action& action);
 void add_plot(CLI::App& app, Action& action);
 void add_export(CLI::App& app, Action& action);
+void add_bcsdf(CLI::App& app, Action& action);
+void add_presets(CLI::App& app, Action& action);
 
 /// The rows of a LobeError that compress, diff and verify print alike.
 nlohmann::ordered_json to_json(const std::vector<LobeError>& errors);

@@ -14,5 +14,7 @@ int main(int argc, char** argv) {
     add_diff(app, action);
     add_plot(app, action);
     add_export(app, action);
+    add_bcsdf(app, action);
+    add_presets(app, action);
     return run_program(app, argc, argv, [&] { action(); });
 }

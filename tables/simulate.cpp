@@ -126,9 +126,10 @@ Table simulate_longitudinal(const Request& request, ProgressMode mode) {
             if (!solved.empty()) both = std::move(solved[i]);
             const double error = solved.empty() ? 1 : std::max(both.back.standard_error, both.forward.standard_error);
             if (wants_paths(request.method, error)) {
-                sim2d::SlabProfile traced = sim2d::trace_slab(sigma, g[ig], theta_i, table.bins(),
-                                                              trace_options(request, cell_key(1, {sigma, g[ig], theta_i})));
-                if (std::max(traced.back.standard_error, traced.forward.standard_error) < error) both = std::move(traced);
+                sim2d::SlabProfile traced = sim2d::trace_slab(
+                    sigma, g[ig], theta_i, table.bins(), trace_options(request, cell_key(1, {sigma, g[ig], theta_i})));
+                if (std::max(traced.back.standard_error, traced.forward.standard_error) < error)
+                    both = std::move(traced);
             }
             const std::size_t cell = 2 * (slice * angles + i);
             store(table, cell, both.back);

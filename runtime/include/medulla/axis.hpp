@@ -61,8 +61,16 @@ struct AxisView {
         std::memcpy(&k, knots + sizeof(Knot<T>) * static_cast<std::size_t>(i + std::int32_t(ghost_knots)), sizeof k);
         return k;
     }
-    MEDULLA_FN T lower() const noexcept { return knot(0).t; }
-    MEDULLA_FN T upper() const noexcept { return knot(std::int32_t(spans)).t; }
+    /// Number `field` of knot i (0: t, 1 to 3: the reciprocals), read alone: a lookup needs few of them.
+    MEDULLA_FN T number(std::int32_t i, std::size_t field) const noexcept {
+        T t;
+        const auto index = static_cast<std::size_t>(i + std::int32_t(ghost_knots));
+        std::memcpy(&t, knots + sizeof(Knot<T>) * index + sizeof(T) * field, sizeof t);
+        return t;
+    }
+    MEDULLA_FN T breakpoint(std::int32_t i) const noexcept { return number(i, 0); }
+    MEDULLA_FN T lower() const noexcept { return breakpoint(0); }
+    MEDULLA_FN T upper() const noexcept { return breakpoint(std::int32_t(spans)); }
 };
 
 /// A value on an axis: t[span] <= x <= t[span + 1].
@@ -77,12 +85,17 @@ struct Cell {
 template <class T>
 MEDULLA_FN Cell<T> locate(const AxisView<T>& axis, T x) noexcept {
     const T lower = axis.lower(), upper = axis.upper();
-    if (axis.periodic) x -= std::floor((x - lower) / (upper - lower)) * (upper - lower);
+    if (axis.periodic && !(x >= lower && x <= upper)) x -= std::floor((x - lower) / (upper - lower)) * (upper - lower);
     x = x < lower ? lower : (x > upper ? upper : x);
-    std::uint32_t span = 0;
+    // Even breakpoints are where they would be expected; else a binary search, whose steps are masks and no branches.
+    const T even = (x - lower) / (upper - lower) * T(axis.spans);
+    std::uint32_t span = even > T(0) ? std::uint32_t(std::int32_t(even)) : 0;
+    span = span < axis.spans ? span : axis.spans - 1;
+    if (axis.breakpoint(std::int32_t(span)) <= x && x < axis.breakpoint(std::int32_t(span + 1))) return {span, x};
+    span = 0;
     for (std::uint32_t n = axis.spans; n > 1;) {
         const std::uint32_t half = n / 2;
-        span = axis.knot(std::int32_t(span + half)).t <= x ? span + half : span;
+        span += half & (0u - std::uint32_t(axis.breakpoint(std::int32_t(span + half)) <= x));
         n -= half;
     }
     return {span, x};
@@ -104,14 +117,14 @@ struct SplineWeights {
 template <class T>
 MEDULLA_FN SplineWeights<T> spline_weights(const AxisView<T>& axis, const Cell<T>& cell) noexcept {
     const auto i = std::int32_t(cell.span);
-    const Knot<T> k_2 = axis.knot(i - 2), k_1 = axis.knot(i - 1), k0 = axis.knot(i);
-    const T k1 = axis.knot(i + 1).t, k2 = axis.knot(i + 2).t, k3 = axis.knot(i + 3).t;
+    const T k1 = axis.breakpoint(i + 1), k2 = axis.breakpoint(i + 2), k3 = axis.breakpoint(i + 3);
     const T x = cell.x;
-    const T l1 = x - k0.t, l2 = x - k_1.t, l3 = x - k_2.t, r1 = k1 - x, r2 = k2 - x, r3 = k3 - x;
-    const T n0 = r1 * k0.inverse1, n1 = l1 * k0.inverse1;
-    const T a = n0 * k_1.inverse2, b = n1 * k0.inverse2;
+    const T l1 = x - axis.breakpoint(i), l2 = x - axis.breakpoint(i - 1), l3 = x - axis.breakpoint(i - 2);
+    const T r1 = k1 - x, r2 = k2 - x, r3 = k3 - x;
+    const T n0 = r1 * axis.number(i, 1), n1 = l1 * axis.number(i, 1);
+    const T a = n0 * axis.number(i - 1, 2), b = n1 * axis.number(i, 2);
     const T m0 = r1 * a, m1 = l2 * a + r2 * b, m2 = l1 * b;
-    const T c = m0 * k_2.inverse3, d = m1 * k_1.inverse3, e = m2 * k0.inverse3;
+    const T c = m0 * axis.number(i - 2, 3), d = m1 * axis.number(i - 1, 3), e = m2 * axis.number(i, 3);
     return {{r1 * c, l3 * c + r2 * d, l2 * d + r3 * e, l1 * e}};
 }
 

@@ -7,6 +7,10 @@
 
 #include "medulla/pack.hpp"
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 namespace medulla {
 
 /// Where in a table's parameter space: only the axes that the table has are read.
@@ -41,51 +45,129 @@ struct Contraction {
 
 namespace detail {
 
-/// out[r] = sum over four rows of w[t] * row_t[r], for eight components.
-MEDULLA_FN void blend_rows(const TableView& table, std::uint32_t k, std::uint32_t span, const SplineWeights<float>& w,
-                           std::uint32_t first, float (&out)[rank_multiple]) noexcept {
-    for (std::uint32_t r = 0; r < rank_multiple; ++r) out[r] = 0;
-    for (std::uint32_t t = 0; t < 4; ++t) {
-        std::int16_t q[rank_multiple];
-        std::memcpy(q, table.row(k, span + t) + 2 * first, sizeof q);
-        for (std::uint32_t r = 0; r < rank_multiple; ++r) out[r] += w.w[t] * float(q[r]);
-    }
+/// Eight components side by side: SSE2, which every x86-64 has, or plain floats.
+#if defined(__SSE2__) && !defined(__CUDA_ARCH__) && !defined(__HIP_DEVICE_COMPILE__)
+struct Eight {
+    __m128 low, high;
+};
+MEDULLA_FN Eight zero_eight() noexcept { return {_mm_setzero_ps(), _mm_setzero_ps()}; }
+MEDULLA_FN Eight load_eight(const float* x) noexcept { return {_mm_loadu_ps(x), _mm_loadu_ps(x + 4)}; }
+MEDULLA_FN void store_eight(Eight a, float* x) noexcept { _mm_storeu_ps(x, a.low), _mm_storeu_ps(x + 4, a.high); }
+MEDULLA_FN Eight convert_eight(const unsigned char* row) noexcept {
+    // A word moved to the upper half and shifted down keeps its sign.
+    const __m128i q = _mm_loadu_si128(reinterpret_cast<const __m128i*>(row));
+    return {_mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(q, q), 16)),
+            _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(q, q), 16))};
+}
+MEDULLA_FN Eight times(Eight a, Eight b) noexcept { return {_mm_mul_ps(a.low, b.low), _mm_mul_ps(a.high, b.high)}; }
+MEDULLA_FN Eight times(float a, Eight b) noexcept {
+    const __m128 w = _mm_set1_ps(a);
+    return {_mm_mul_ps(w, b.low), _mm_mul_ps(w, b.high)};
+}
+MEDULLA_FN Eight plus(Eight a, Eight b) noexcept { return {_mm_add_ps(a.low, b.low), _mm_add_ps(a.high, b.high)}; }
+MEDULLA_FN float sum_of(Eight a) noexcept {
+    const __m128 x = _mm_add_ps(a.low, a.high), y = _mm_add_ps(x, _mm_movehl_ps(x, x));
+    return _mm_cvtss_f32(_mm_add_ss(y, _mm_shuffle_ps(y, y, 1)));
+}
+#else
+struct Eight {
+    float x[rank_multiple];
+};
+MEDULLA_FN Eight zero_eight() noexcept { return {}; }
+MEDULLA_FN Eight load_eight(const float* x) noexcept {
+    Eight a;
+    std::memcpy(a.x, x, sizeof a.x);
+    return a;
+}
+MEDULLA_FN void store_eight(const Eight& a, float* x) noexcept { std::memcpy(x, a.x, sizeof a.x); }
+MEDULLA_FN Eight convert_eight(const unsigned char* row) noexcept {
+    std::int16_t q[rank_multiple];
+    std::memcpy(q, row, sizeof q);
+    Eight a;
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) a.x[r] = float(q[r]);
+    return a;
+}
+MEDULLA_FN Eight times(const Eight& a, Eight b) noexcept {
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) b.x[r] *= a.x[r];
+    return b;
+}
+MEDULLA_FN Eight times(float a, Eight b) noexcept {
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) b.x[r] *= a;
+    return b;
+}
+MEDULLA_FN Eight plus(const Eight& a, Eight b) noexcept {
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) b.x[r] += a.x[r];
+    return b;
+}
+MEDULLA_FN float sum_of(const Eight& a) noexcept {
+    const float* x = a.x;
+    return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]));
+}
+#endif
+
+/// sum over four rows of w[t] * row_t, for eight components; rows are `step` bytes apart.
+MEDULLA_FN Eight blend(const unsigned char* row, std::size_t step, const SplineWeights<float>& w) noexcept {
+    const Eight a = times(w.w[0], convert_eight(row)), b = times(w.w[1], convert_eight(row + step));
+    const Eight c = times(w.w[2], convert_eight(row + 2 * step)), d = times(w.w[3], convert_eight(row + 3 * step));
+    return plus(plus(a, b), plus(c, d));
 }
 
-MEDULLA_FN void load_floats(const TableView& table, std::uint32_t offset, std::uint32_t first,
-                            float (&out)[rank_multiple]) noexcept {
-    std::memcpy(out, table.bytes + offset + 4 * first, sizeof out);
+MEDULLA_FN Eight load_eight(const TableView& table, std::uint32_t offset, std::uint32_t first) noexcept {
+    float x[rank_multiple];
+    std::memcpy(x, table.bytes + offset + 4 * first, sizeof x);
+    return load_eight(x);
+}
+
+/// sum over r of weight[r] * (row `row` of axis k)[r].
+MEDULLA_FN float row_sum(const TableView& table, std::uint32_t k, std::uint32_t row, const float* weight) noexcept {
+    const unsigned char* bytes = table.row(k, row);
+    Eight sum = zero_eight();
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple)
+        sum = plus(sum, times(load_eight(weight + first), convert_eight(bytes + 2 * first)));
+    return sum_of(sum);
 }
 
 }  // namespace detail
 
+/// weight[r] = scale_r: no axis contracted yet.
+MEDULLA_FN void start_contraction(const TableView& table, float* weight) noexcept {
+    std::memcpy(weight, table.bytes + table.layout.scales_offset, 4 * std::size_t(table.layout.rank_stride));
+}
+
+/// to[r] = from[r] * (factor r of axis k at x), x a value of the axis's quantity; values outside are held to its ends.
+MEDULLA_FN void contract_axis(const TableView& table, std::uint32_t k, float x, const float* from, float* to) noexcept {
+    const AxisView<float> axis = table.axis(k);
+    const auto quantity = static_cast<Quantity>(table.layout.axes[k].quantity);
+    const Cell<float> cell = locate(axis, spline_coordinate(quantity, x));
+    const SplineWeights<float> weights = spline_weights(axis, cell);
+    const unsigned char* row = table.row(k, cell.span);
+    const std::uint32_t stride = table.layout.rank_stride;
+    for (std::uint32_t first = 0; first < stride; first += rank_multiple) {
+        const detail::Eight factor = detail::blend(row + 2 * first, 2 * std::size_t(stride), weights);
+        detail::store_eight(detail::times(detail::load_eight(from + first), factor), to + first);
+    }
+}
+
+/// 1 / integral over the exit direction of the contracted lobe. A signed low-rank sum with no positive integral is no
+/// density; it has no light to give and 0 is returned.
+MEDULLA_FN float inverse_integral(const TableView& table, const float* weight) noexcept {
+    detail::Eight sum = detail::zero_eight();
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple)
+        sum = detail::plus(sum, detail::times(detail::load_eight(weight + first),
+                                              detail::load_eight(table, table.layout.integrals_offset, first)));
+    const float total = detail::sum_of(sum);
+    return total > 1e-30f && total < 1e30f ? 1.0f / total : 0.0f;
+}
+
 /// Contracts the parameter axes of `table` at `query`; values outside an axis are held to its ends.
 MEDULLA_FN Contraction contract(const TableView& table, const LobeQuery& query) noexcept {
-    Cell<float> cells[max_axes];
-    SplineWeights<float> weights[max_axes];
-    const std::uint32_t axes = table.parameter_axes();
-    for (std::uint32_t k = 0; k < axes; ++k) {
-        const auto quantity = static_cast<Quantity>(table.layout.axes[k].quantity);
-        const AxisView<float> axis = table.axis(k);
-        cells[k] = locate(axis, spline_coordinate(quantity, query[quantity]));
-        weights[k] = spline_weights(axis, cells[k]);
-    }
     Contraction result;
-    float integral = 0;
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
-        float product[rank_multiple], factor[rank_multiple];
-        detail::load_floats(table, table.layout.scales_offset, first, product);
-        for (std::uint32_t k = 0; k < axes; ++k) {
-            detail::blend_rows(table, k, cells[k].span, weights[k], first, factor);
-            for (std::uint32_t r = 0; r < rank_multiple; ++r) product[r] *= factor[r];
-        }
-        for (std::uint32_t r = 0; r < rank_multiple; ++r) result.weight[first + r] = product[r];
-        if (table.has_exit()) {
-            detail::load_floats(table, table.layout.integrals_offset, first, factor);
-            for (std::uint32_t r = 0; r < rank_multiple; ++r) integral += product[r] * factor[r];
-        }
+    start_contraction(table, result.weight);
+    for (std::uint32_t k = 0; k < table.parameter_axes(); ++k) {
+        const auto quantity = static_cast<Quantity>(table.layout.axes[k].quantity);
+        contract_axis(table, k, query[quantity], result.weight, result.weight);
     }
-    result.inverse_integral = 1.0f / integral;
+    result.inverse_integral = table.has_exit() ? inverse_integral(table, result.weight) : 1.0f;
     return result;
 }
 
@@ -95,14 +177,13 @@ MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contract
     const AxisView<float> axis = table.axis(exit);
     const Cell<float> cell = locate(axis, y);
     const SplineWeights<float> weights = spline_weights(axis, cell);
-    float sum[rank_multiple] = {}, factor[rank_multiple];
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
-        detail::blend_rows(table, exit, cell.span, weights, first, factor);
-        for (std::uint32_t r = 0; r < rank_multiple; ++r) sum[r] += contraction.weight[first + r] * factor[r];
-    }
-    float total = 0;
-    for (std::uint32_t r = 0; r < rank_multiple; ++r) total += sum[r];
-    return total * contraction.inverse_integral;
+    const unsigned char* row = table.row(exit, cell.span);
+    const std::uint32_t stride = table.layout.rank_stride;
+    detail::Eight sum = detail::zero_eight();
+    for (std::uint32_t first = 0; first < stride; first += rank_multiple)
+        sum = detail::plus(sum, detail::times(detail::load_eight(contraction.weight + first),
+                                              detail::blend(row + 2 * first, 2 * std::size_t(stride), weights)));
+    return detail::sum_of(sum) * contraction.inverse_integral;
 }
 
 /// Density per radian, >= 0, with integral 1: a signed low-rank sum dips below 0 where the lobe is nearly 0, and

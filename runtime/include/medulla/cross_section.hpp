@@ -1,0 +1,142 @@
+// A ray through the fibre's cross-section: refraction, Fresnel terms, path lengths, where each lobe leaves, what is
+// left of it. Rests on Yan et al. 2017, Eqs. 13-16, 20, 21 with the errata of docs/bcsdf.md; everything here is a pure
+// formula.
+#pragma once
+
+#include <cmath>
+
+#include "medulla/config.hpp"
+#include "medulla/fur_parameters.hpp"
+#include "medulla/real_math.hpp"
+
+namespace medulla {
+
+/// What the inclination theta_i decides for a whole cross-section.
+template <class T>
+struct Inclination {
+    T cos_i;          ///< cos theta_i, > 0
+    T index_excess;   ///< eta'^2 - 1 = (eta^2 - 1) / cos^2 theta_i, > 0: no digits lost as eta -> 1
+    T inverse_index;  ///< 1 / eta', in (0, 1); eta' = sqrt(eta^2 - sin^2 theta_i) / cos theta_i (Bravais)
+    T inverse_cos_t;  ///< 1 / cos theta_t, sin theta_t = sin theta_i / eta
+};
+
+template <class T>
+MEDULLA_FN Inclination<T> inclination(T eta, T cos_i) noexcept {
+    const T excess = (eta - T(1)) * (eta + T(1));
+    const T root = std::sqrt(excess + cos_i * cos_i);  // eta cos theta_t
+    return {cos_i, excess / (cos_i * cos_i), cos_i / root, eta / root};
+}
+
+/// Reflectance F and transmittance 1 - F of the cuticle.
+template <class T>
+struct Cuticle {
+    T F, T_;
+};
+
+/// Where a ray at offset h goes.
+template <class T>
+struct Path {
+    T gamma_i, gamma_t;  ///< angle to the normal outside and inside [radians]
+    T h_inside;          ///< h / eta': offset of the refracted chord [fibre radii]
+    T s_m, s_c;          ///< half-lengths of one chord in medulla and cortex [fibre radii]
+    Cuticle<T> cuticle;
+};
+
+/// F_1 = mean over polarisations of R + (1-R)^2 R / (1-R^2) = 2R / (1+R), F = l F_1 / (1 + (l-1) F_1) (Eq. 13).
+/// Differences are expanded so that eta' -> 1 and cos gamma_i -> 0 lose no digits (docs/bcsdf.md, 'Fresnel').
+/// @param cos_i cos gamma_i  @param x sqrt(index_excess + cos_i^2) = eta' cos gamma_t
+template <class T>
+MEDULLA_FN Cuticle<T> cuticle(T layers, T index_excess, T cos_i, T x) noexcept {
+    const T s = cos_i + x, inverse_s = T(1) / s;
+    const T index2 = T(1) + index_excess, ci = index2 * cos_i, inverse_p = T(1) / (ci + x);
+    const T rs = index_excess * inverse_s * inverse_s;
+    const T rp = index_excess * inverse_p * ((cos_i * cos_i * (index2 + T(1)) - T(1)) * inverse_p);
+    const T Rs = rs * rs, Rp = rp * rp;
+    const T Ts = T(2) * cos_i * inverse_s * (T(1) + rs);     // 1 - Rs
+    const T Tp = T(4) * (ci * inverse_p) * (x * inverse_p);  // 1 - Rp
+    const T ps = T(1) / (T(1) + Rs), pp = T(1) / (T(1) + Rp);
+    const T F1 = Rs * ps + Rp * pp, T1 = T(0.5) * (Ts * ps + Tp * pp);  // they add up to 1
+    // Fewer layers than 1e-30 would be seen at h = 1 alone, where T1 is 0, and there 1 / (layers F1) may overflow.
+    if (!(layers > T(1e-30))) return {T(0), T(1)};
+    const T inverse = T(1) / (T1 + layers * F1);
+    return {layers * F1 * inverse, T1 * inverse};
+}
+
+/// @param cos_i cos gamma_i = sqrt(1 - h^2), given beside h because the caller often has it without cancellation
+template <class T>
+MEDULLA_FN Path<T> trace(const Inclination<T>& at, T kappa, T layers, T h, T cos_i) noexcept {
+    Path<T> path;
+    const T x = std::sqrt(at.index_excess + cos_i * cos_i);
+    const T sin_t = h * at.inverse_index, cos_t = x * at.inverse_index;
+    path.h_inside = sin_t;
+    path.gamma_i = real_math::angle(h, cos_i);
+    path.gamma_t = real_math::angle(sin_t, cos_t);
+    const T s2 = (kappa - sin_t) * (kappa + sin_t);
+    path.s_m = s2 > T(0) ? std::sqrt(s2) : T(0);
+    // cos gamma_t - s_m = (1 - kappa^2) / (cos gamma_t + s_m) inside the medulla: exactly 0 for kappa = 1.
+    path.s_c = path.s_m > T(0) ? (T(1) - kappa) * (T(1) + kappa) / (cos_t + path.s_m) : cos_t;
+    path.cuticle = cuticle(layers, at.index_excess, cos_i, x);
+    return path;
+}
+
+/// Phi_p = 2 p gamma_t - 2 gamma_i + p pi (Eq. 15).
+template <class T>
+MEDULLA_FN T unscattered_centre(int p, T gamma_i, T gamma_t) noexcept {
+    return T(2 * p) * gamma_t - T(2) * gamma_i + T(p) * T(pi);
+}
+
+/// Phi^s_p = (gamma_t - gamma_i) + (p - 1)(pi + 2 gamma_t) (Eq. 21), p = 1, 2.
+template <class T>
+MEDULLA_FN T scattered_centre(int p, T gamma_i, T gamma_t) noexcept {
+    return (gamma_t - gamma_i) + T(p - 1) * (T(pi) + T(2) * gamma_t);
+}
+
+/// What the inclination decides for attenuation: coefficients over cos theta_t and T_b of Eq. 20.
+template <int Channels>
+struct Absorption {
+    float medulla_extinction;  ///< (sigma_ma + sigma_ms) / cos theta_t
+    float medulla_scattering;  ///< sigma_ms / cos theta_t
+    float cortex[Channels];    ///< sigma_ca / cos theta_t
+    float T_b[Channels];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t)
+};
+
+template <int Channels>
+MEDULLA_FN Absorption<Channels> absorption(const FurParameters<Channels>& p, float inverse_cos_t) noexcept {
+    Absorption<Channels> a;
+    a.medulla_extinction = (p.sigma_ma + p.sigma_ms) * inverse_cos_t;
+    a.medulla_scattering = p.sigma_ms * inverse_cos_t;
+    for (int c = 0; c < Channels; ++c) {
+        a.cortex[c] = p.sigma_ca[c] * inverse_cos_t;
+        a.T_b[c] = real_math::exponential(-(p.kappa * p.sigma_ma * inverse_cos_t + (1 - p.kappa) * a.cortex[c]));
+    }
+    return a;
+}
+
+/// Energies A of the five lobes, Eqs. 13, 14, 20; the scattered ones include E = 1 - exp(-2 s_m sigma_ms / cos
+/// theta_t), the energy of C^N, so that every lobe's azimuthal integral is its A.
+template <int Channels>
+struct Energies {
+    float A[lobe_count][Channels];
+};
+
+template <int Channels>
+MEDULLA_FN Energies<Channels> energies(const Path<float>& path, const Absorption<Channels>& a,
+                                       bool scattered) noexcept {
+    using real_math::exponential;
+    Energies<Channels> e;
+    const float F = path.cuticle.F, T = path.cuticle.T_;
+    const float m = exponential(-path.s_m * a.medulla_extinction);
+    const float E = scattered ? real_math::absorbed(2 * path.s_m * a.medulla_scattering) : 0.0f;
+    for (int c = 0; c < Channels; ++c) {
+        const float q = exponential(-path.s_c * a.cortex[c]), through = (q * m) * (q * m);
+        const float s = T * q * a.T_b[c] * E;
+        e.A[0][c] = F;
+        e.A[1][c] = T * T * through;
+        e.A[2][c] = e.A[1][c] * F * through;
+        e.A[3][c] = s;
+        e.A[4][c] = s * F * through;
+    }
+    return e;
+}
+
+}  // namespace medulla

@@ -1,0 +1,255 @@
+// The fur fibre in the near field: prepared once per material, then once per (theta_i, h), then any number of exits.
+// Rests on Yan et al. 2017, Sec. 4 with the errata of docs/bcsdf.md, and on the pack's C^M and C^N.
+//
+// Frame. The fibre runs along x; (y, z) is its cross-section. A direction has inclination theta = asin x in
+// [-pi/2, pi/2] and azimuth phi = atan2(z, y). omega_i points towards the light, omega_r to where light leaves,
+// phi = phi_r - phi_i: 0 is back towards the light, pi straight on. alpha > 0 turns R towards +x, so x points from tip
+// to root. h in [-1, 1] is the offset of the incoming ray along the left normal (counter-clockwise in (y, z)) of its
+// direction of travel -omega_i. 'i' is the direction that is known, with its h: the light's in light tracing; in path
+// tracing, by reciprocity, the camera ray's.
+//
+// Value. S = sum over lobes of M N / cos^2 theta_i (Eq. 12). L_r = integral of L_i S cos(theta_i) over solid angle, so
+// that in (theta, phi) the cosines cancel: sum M N is the density of the energy per radian^2 of (theta_r, phi), and
+// sum M N / cos theta_r that per steradian. Every M integrates to 1 over theta_r, every N to its A over phi.
+#pragma once
+
+#include <cmath>
+
+#include "medulla/config.hpp"
+#include "medulla/cross_section.hpp"
+#include "medulla/fur_parameters.hpp"
+#include "medulla/gaussian.hpp"
+#include "medulla/lookup.hpp"
+#include "medulla/pack.hpp"
+
+namespace medulla {
+
+/// A table with the axes contracted that a material fixes: g, and absorption at 0 (Eq. 20 has it in T_b).
+struct MaterialTable {
+    TableView view;
+    std::uint32_t sigma_axis = 0, last_axis = 0;  ///< the two axes left: sigma, and h or theta_i
+    alignas(32) float weight[max_rank] = {};      ///< [0, rank_stride) is set
+};
+
+MEDULLA_FN void prepare_table(const TableView& view, float g, MaterialTable& table) noexcept {
+    table.view = view;
+    start_contraction(view, table.weight);
+    for (std::uint32_t k = 0; k < view.parameter_axes(); ++k) {
+        switch (static_cast<Quantity>(view.layout.axes[k].quantity)) {
+            case Quantity::sigma:
+                table.sigma_axis = k;
+                break;
+            case Quantity::g:
+                contract_axis(view, k, g, table.weight, table.weight);
+                break;
+            case Quantity::absorption:
+                contract_axis(view, k, 0.0f, table.weight, table.weight);
+                break;
+            default:
+                table.last_axis = k;
+        }
+    }
+}
+
+/// The lobe that is left at (sigma, h or theta_i).
+MEDULLA_FN void contract(const MaterialTable& table, float sigma, float last, Contraction& result) noexcept {
+    contract_axis(table.view, table.sigma_axis, sigma, table.weight, result.weight);
+    contract_axis(table.view, table.last_axis, last, result.weight, result.weight);
+    result.inverse_integral = inverse_integral(table.view, result.weight);
+}
+
+/// A material, ready to be asked. It borrows the pack's bytes, allocates nothing and is constant once prepared.
+template <int Channels = 3>
+struct FurFibre {
+    FurParameters<Channels> parameters;
+    FurStatus status = FurStatus::bad_eta;
+    bool scattered = false;                             ///< whether there are scattered lobes to read
+    float shift[3] = {}, deviation[3] = {};             ///< alpha_p, beta_p of Table 2 [radians]
+    WrappedGaussian<float> azimuthal_gaussian[3] = {};  ///< variance (p + 1) beta_n^2 (Eq. 16)
+    MaterialTable azimuthal, back, forward;
+};
+
+/// Prepares `fibre`. kappa = 0 or sigma_ms = 0 never reads a table and is exactly the hair model R + TT + TRT.
+template <int Channels>
+MEDULLA_FN FurStatus prepare(const FurParameters<Channels>& p, const PackView& pack,
+                             FurFibre<Channels>& fibre) noexcept {
+    fibre.parameters = p;
+    fibre.scattered = false;
+    fibre.status = check(p);
+    if (!usable(fibre.status)) return fibre.status;
+    const float shift[3] = {1.0f, -0.5f, -1.5f}, rough[3] = {1.0f, 0.5f, 1.5f};
+    for (int lobe = 0; lobe < 3; ++lobe) {
+        fibre.shift[lobe] = shift[lobe] * p.alpha;
+        fibre.deviation[lobe] = rough[lobe] * p.beta_m;
+        fibre.azimuthal_gaussian[lobe] = wrapped_gaussian(std::sqrt(float(lobe + 1)) * p.beta_n);
+    }
+    if (!(p.kappa > 0 && p.sigma_ms > 0)) return fibre.status;
+    const TableView& azimuthal = pack[TableKind::azimuthal];
+    const TableView& back = pack[TableKind::longitudinal_back];
+    const TableView& forward = pack[TableKind::longitudinal_forward];
+    if (!azimuthal) return fibre.status = FurStatus::no_azimuthal_table;
+    if (!back || !forward) return fibre.status = FurStatus::no_longitudinal_table;
+    prepare_table(azimuthal, p.g, fibre.azimuthal);
+    prepare_table(back, p.g, fibre.back);
+    prepare_table(forward, p.g, fibre.forward);
+    fibre.scattered = true;
+    return fibre.status;
+}
+
+/// Each lobe's factors: its value is M N / cos^2 theta_i.
+template <int Channels = 3>
+struct LobeValues {
+    float M[lobe_count] = {};            ///< longitudinal density [1 / radian]
+    float N[lobe_count][Channels] = {};  ///< azimuthal density times energy [1 / radian]
+};
+
+template <int Channels = 3>
+struct Colour {
+    float value[Channels] = {};
+};
+
+/// sum M N: density of energy per radian^2 of (theta_r, phi).
+template <int Channels>
+MEDULLA_FN Colour<Channels> angular_density(const LobeValues<Channels>& lobes) noexcept {
+    Colour<Channels> sum;
+    for (int lobe = 0; lobe < lobe_count; ++lobe)
+        for (int c = 0; c < Channels; ++c) sum.value[c] += lobes.M[lobe] * lobes.N[lobe][c];
+    return sum;
+}
+
+/// Least cosine of an inclination that a float angle can mean: half a spacing of floats around pi/2, 2^-24.5. A
+/// direction nearer to the axis than that is the axis itself, where a fibre has no cross-section: lobes are 0 there.
+inline constexpr float least_cosine = 4.3e-8f;
+
+/// The part that theta_i decides.
+template <int Channels = 3>
+struct Longitudinal {
+    bool valid = false;
+    float theta_i = 0;
+    float sigma = 0;  ///< optical radius sigma_ms kappa / cos theta_t [1]
+    Inclination<float> at = {};
+    Absorption<Channels> absorption = {};
+    TruncatedGaussian<float> gaussian[3] = {};
+    Contraction back, forward;  ///< set where the fibre scatters
+};
+
+/// @param theta_i [radians], in (-pi/2, pi/2); outside it the result is not valid and every lobe is 0
+template <int Channels>
+MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, Longitudinal<Channels>& m) noexcept {
+    m.valid = false;
+    if (!usable(fibre.status) || !detail::within(theta_i, float(pi / 2))) return;
+    const float cos_i = std::cos(theta_i);
+    if (!(cos_i >= least_cosine)) return;
+    m.valid = true;
+    m.theta_i = theta_i;
+    m.at = inclination(fibre.parameters.eta, cos_i);
+    m.absorption = absorption(fibre.parameters, m.at.inverse_cos_t);
+    for (int p = 0; p < 3; ++p) m.gaussian[p] = truncated_gaussian(fibre.shift[p] - theta_i, fibre.deviation[p]);
+    m.sigma = fibre.parameters.sigma_ms * fibre.parameters.kappa * m.at.inverse_cos_t;
+    if (!fibre.scattered) return;
+    const float inclined = theta_i < 0 ? -theta_i : theta_i;
+    contract(fibre.back, m.sigma, inclined, m.back);
+    contract(fibre.forward, m.sigma, inclined, m.forward);
+}
+
+/// M of the three unscattered lobes and, where `scattered`, M^s (Eq. 19): lerp over |phi| / pi of C^M back and forward.
+template <int Channels>
+MEDULLA_FN void longitudinal_lobes(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m, float theta_r,
+                                   float phi, bool scattered, LobeValues<Channels>& lobes) noexcept {
+    for (int p = 0; p < 3; ++p) lobes.M[p] = m.gaussian[p].pdf(theta_r);
+    if (!scattered) return;
+    const float side = m.theta_i < 0 ? -theta_r : theta_r;
+    const float t = std::abs(wrap_angle(phi)) * float(1 / pi);
+    const float back = lobe(fibre.back.view, m.back, side), forward = lobe(fibre.forward.view, m.forward, side);
+    lobes.M[3] = lobes.M[4] = (1 - t) * back + t * forward;
+}
+
+/// The fibre lit from theta_i at offset h: what is left is a function of the exit (theta_r, phi).
+template <int Channels = 3>
+struct NearField {
+    const FurFibre<Channels>* fibre = nullptr;
+    Longitudinal<Channels> longitudinal;
+    bool valid = false, scattered = false;
+    float side = 1;                 ///< sign of h
+    float centre[lobe_count] = {};  ///< Phi_p and Phi^s_p + pi [radians]
+    Energies<Channels> energy = {};
+    Contraction azimuthal;  ///< set where `scattered`
+
+    /// M and N of every lobe at (theta_r, phi) [radians]; all 0 outside theta_r in [-pi/2, pi/2] or for |phi| > 1e4.
+    MEDULLA_FN LobeValues<Channels> lobes(float theta_r, float phi) const noexcept {
+        LobeValues<Channels> result;
+        if (!valid || !detail::within(theta_r, float(pi / 2)) || !detail::within(phi, 1e4f)) return result;
+        longitudinal_lobes(*fibre, longitudinal, theta_r, phi, scattered, result);
+        for (int p = 0; p < 3; ++p) {
+            const float D = fibre->azimuthal_gaussian[p].pdf(phi - centre[p]);
+            for (int c = 0; c < Channels; ++c) result.N[p][c] = energy.A[p][c] * D;
+        }
+        for (int p = 3; scattered && p < 5; ++p) {
+            const float D = lobe(fibre->azimuthal.view, azimuthal, side * (phi - centre[p]));
+            for (int c = 0; c < Channels; ++c) result.N[p][c] = energy.A[p][c] * D;
+        }
+        return result;
+    }
+    /// S of Eq. 12.
+    MEDULLA_FN Colour<Channels> eval(float theta_r, float phi) const noexcept {
+        Colour<Channels> sum = angular_density(lobes(theta_r, phi));
+        const float cosine = longitudinal.at.cos_i;
+        for (int c = 0; valid && c < Channels; ++c) sum.value[c] /= cosine * cosine;
+        return sum;
+    }
+};
+
+/// Scattered lobes that carry less than this of the incident energy in every channel are left out: it bounds the error
+/// of the fibre's albedo, and it is what a float sum of energies near 1 cannot show.
+inline constexpr float negligible_energy = 5.9604645e-8f;  // 2^-24
+
+/// Sets `near` to another offset under the same theta_i: near.longitudinal is set and valid, h in [-1, 1].
+template <int Channels>
+MEDULLA_FN void offset_at(NearField<Channels>& near, float h) noexcept {
+    const FurFibre<Channels>& fibre = *near.fibre;
+    const Longitudinal<Channels>& m = near.longitudinal;
+    const FurParameters<Channels>& p = fibre.parameters;
+    const Path<float> path = trace(m.at, p.kappa, p.layers, h, std::sqrt((1 - h) * (1 + h)));
+    near.valid = true;
+    near.side = h < 0 ? -1.0f : 1.0f;
+    for (int k = 0; k < 3; ++k) near.centre[k] = unscattered_centre(k, path.gamma_i, path.gamma_t);
+    for (int k = 1; k < 3; ++k) near.centre[k + 2] = scattered_centre(k, path.gamma_i, path.gamma_t) + float(pi);
+    near.energy = energies(path, m.absorption, fibre.scattered);
+    near.scattered = false;
+    for (int c = 0; c < Channels; ++c)
+        near.scattered = near.scattered || near.energy.A[3][c] + near.energy.A[4][c] > negligible_energy;
+    if (!near.scattered) return;
+    const float offset = std::abs(path.h_inside) / p.kappa;
+    contract(fibre.azimuthal, m.sigma, offset < 1 ? offset : 1.0f, near.azimuthal);
+}
+
+/// @param h offset [fibre radii], in [-1, 1]; outside it every lobe is 0
+template <int Channels>
+MEDULLA_FN void near_field(const FurFibre<Channels>& fibre, float theta_i, float h,
+                           NearField<Channels>& near) noexcept {
+    near.fibre = &fibre;
+    near.valid = near.scattered = false;
+    longitudinal_at(fibre, theta_i, near.longitudinal);
+    if (!near.longitudinal.valid || !detail::within(h, 1.0f)) return;
+    offset_at(near, h);
+}
+
+/// M and N of every lobe for one offset (the plain way in; keep a NearField where many exits are asked).
+template <int Channels>
+MEDULLA_FN LobeValues<Channels> near_lobes(const FurFibre<Channels>& fibre, float theta_i, float theta_r, float phi,
+                                           float h) noexcept {
+    NearField<Channels> near;
+    near_field(fibre, theta_i, h, near);
+    return near.lobes(theta_r, phi);
+}
+
+/// S of Eq. 12 for one offset.
+template <int Channels>
+MEDULLA_FN Colour<Channels> eval(const FurFibre<Channels>& fibre, float theta_i, float theta_r, float phi,
+                                 float h) noexcept {
+    NearField<Channels> near;
+    near_field(fibre, theta_i, h, near);
+    return near.eval(theta_r, phi);
+}
+
+}  // namespace medulla

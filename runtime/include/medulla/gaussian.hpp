@@ -1,0 +1,189 @@
+// The two Gaussians of the unscattered lobes, each with its density and its sampler: truncated in theta, wrapped in
+// phi. Rests on Eqs. 5 and 7 of Yan et al. 2017; docs/bcsdf.md says why truncated and how the sums converge.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "medulla/config.hpp"
+#include "medulla/real_math.hpp"
+
+namespace medulla {
+
+namespace detail {
+
+/// exp(x^2) erfc(x) for x >= 0, float precision: direct up to 5, then six terms of the asymptotic series
+/// (the seventh is 7e-7 of the sum at x = 5).
+template <class T>
+MEDULLA_FN T scaled_erfc(T x) noexcept {
+    using std::erfc;
+    if (x < T(5)) return std::exp(x * x) * erfc(x);
+    const T u = T(0.5) / (x * x);
+    const T sum = T(1) - u * (T(1) - T(3) * u * (T(1) - T(5) * u * (T(1) - T(7) * u * (T(1) - T(9) * u))));
+    return sum / (x * T(1.7724538509055160));
+}
+
+/// Mass of the standard normal over [near, near + w], near, w >= 0, divided by exp(-near^2 / 2). Kept scaled, a lobe
+/// whose centre lies far outside the interval still has a mass that is no underflow.
+template <class T>
+MEDULLA_FN T scaled_tail_mass(T near, T w) noexcept {
+    constexpr T root_half = T(0.70710678118654752);
+    const T far = near + w;
+    // Short against the tail's length 1 / far: the two tails would cancel, so the density is integrated by four Gauss
+    // nodes, which are exact to float for an exponent that changes by at most 1.
+    if (w * (far + T(1)) < T(1)) {
+        const T x[2] = {T(0.43056815579702629), T(0.16999052179242813)};
+        const T c[2] = {T(0.17392742256872693), T(0.32607257743127307)};
+        T sum = T(0);
+        for (int i = 0; i < 2; ++i) {
+            const T p = w * (T(0.5) + x[i]), q = w * (T(0.5) - x[i]);
+            sum += c[i] * (std::exp(-p * (near + T(0.5) * p)) + std::exp(-q * (near + T(0.5) * q)));
+        }
+        return sum * w * T(0.39894228040143268);
+    }
+    const T tail = std::exp(T(-0.5) * w * (far + near));
+    return T(0.5) * (scaled_erfc(near * root_half) - (tail > T(0) ? tail * scaled_erfc(far * root_half) : T(0)));
+}
+
+/// Mass of the standard normal over [a, b], a <= 0 <= b.
+template <class T>
+MEDULLA_FN T normal_mass(T a, T b) noexcept {
+    constexpr T root_half = T(0.70710678118654752);
+    using std::erf;
+    return T(0.5) * (erf(b * root_half) - erf(a * root_half));
+}
+
+}  // namespace detail
+
+/// Gaussian in theta about `centre`, cut at +-pi/2 and normalised there: its integral over (-pi/2, pi/2) is 1 wherever
+/// the centre lies, so a lobe near grazing keeps its energy.
+template <class T>
+struct TruncatedGaussian {
+    T origin;     ///< the centre or, where that is outside, the edge next to it [radians]
+    T deviation;  ///< of the uncut Gaussian [radians], > 0
+    T inverse;    ///< 1 / deviation
+    T beyond;     ///< how far the centre lies beyond the edge [deviations], 0 where it is inside
+    T peak;       ///< density at the origin [1 / radian]
+
+    MEDULLA_FN T pdf(T theta) const noexcept {
+        const T d = std::abs(theta - origin) * inverse;
+        return peak * real_math::exponential(T(-0.5) * d * (d + T(2) * beyond));
+    }
+};
+
+template <class T>
+MEDULLA_FN TruncatedGaussian<T> truncated_gaussian(T centre, T deviation) noexcept {
+    constexpr T edge = T(pi / 2);
+    const T inverse = T(1) / deviation, a = (-edge - centre) * inverse, b = (edge - centre) * inverse;
+    const T density = T(0.39894228040143268) * inverse;
+    // Both edges 6 deviations away: all but 2e-9 of the mass is inside, less than float can tell.
+    if (a < T(-6) && b > T(6)) return {centre, deviation, inverse, T(0), density};
+    if (a <= T(0) && b >= T(0)) return {centre, deviation, inverse, T(0), density / detail::normal_mass(a, b)};
+    const T beyond = a > T(0) ? a : -b;
+    const T mass = detail::scaled_tail_mass(beyond, T(2) * edge * inverse);
+    return {a > T(0) ? -edge : edge, deviation, inverse, beyond, density / mass};
+}
+
+/// Draws theta from the truncated Gaussian: its distribution function inverted by Newton steps kept in a bracket.
+/// @param u uniform in [0, 1)
+template <class T>
+MEDULLA_FN T sample(const TruncatedGaussian<T>& gaussian, T u) noexcept {
+    constexpr T edge = T(pi / 2);
+    const bool inside = !(gaussian.beyond > T(0)), mirrored = !inside && gaussian.origin > T(0);
+    // d counts deviations from the origin: of either sign where the centre is inside, else into the interval.
+    const T a = inside ? (-edge - gaussian.origin) * gaussian.inverse : T(0);
+    const T b = inside ? (edge - gaussian.origin) * gaussian.inverse : T(2) * edge * gaussian.inverse;
+    const T scale = gaussian.peak * gaussian.deviation;  // density in d at the origin
+    const T to_share = scale * T(2.5066282746310002);    // from mass of the uncut normal
+    const T v = mirrored ? T(1) - u : u;
+    // 7.5 deviations from the centre hold all but 3e-14.
+    T low = inside && a < T(-7.5) ? T(-7.5) : a, high = inside && b > T(7.5) ? T(7.5) : b;
+    const T left = T(1) - v;
+    T d = inside ? T(0) : -std::log(left > T(1e-30) ? left : T(1e-30)) / (gaussian.beyond + T(1));
+    for (int i = 0; i < 60; ++i) {
+        if (!(d > low && d < high)) d = T(0.5) * (low + high);
+        T share;
+        if (!inside) {
+            share = to_share * detail::scaled_tail_mass(gaussian.beyond, d);
+        } else if (d >= T(0)) {
+            share = to_share * detail::normal_mass(a, d);
+        } else {
+            share = T(1) - to_share * detail::normal_mass(d, b);
+            // Far from the other edge the left tail is known better by itself.
+            if (a < T(-5)) share = to_share * T(0.5) * std::erfc(-d * T(0.70710678118654752));
+        }
+        const T error = share - v;
+        (error > T(0) ? high : low) = d;
+        const T density = scale * std::exp(T(-0.5) * d * (d + T(2) * gaussian.beyond));
+        const T next = density > T(0) ? d - error / density : T(0.5) * (low + high);
+        // The density falls by e over 1 / beyond where the centre is outside: steps are measured by that.
+        const bool done = std::abs(next - d) * (T(1) + gaussian.beyond) < T(2e-6) || high - low < T(1e-7) * std::abs(d);
+        d = next > low && next < high ? next : (done ? d : T(0.5) * (low + high));
+        if (done) break;
+    }
+    const T theta = gaussian.origin + (mirrored ? -gaussian.deviation : gaussian.deviation) * d;
+    return theta < -edge ? -edge : (theta > edge ? edge : theta);
+}
+
+/// `x` less whole turns, in [-pi, pi]; |x| < 1e9.
+template <class T>
+MEDULLA_FN T wrap_angle(T x) noexcept {
+    constexpr T turn = T(2 * pi);
+    const T turns = x * T(1 / (2 * pi));
+    const T y = x - turn * T(static_cast<std::int32_t>(turns + (turns < T(0) ? T(-0.5) : T(0.5))));
+    return y < T(-pi) ? T(-pi) : (y > T(pi) ? T(pi) : y);
+}
+
+/// Gaussian of an angle wrapped on the circle, integral 1 over a turn.
+template <class T>
+struct WrappedGaussian {
+    T deviation;  ///< [radians], > 0
+    T inverse;    ///< 1 / deviation
+    T peak;       ///< 1 / (deviation sqrt(2 pi))
+    T damping;    ///< exp(-deviation^2 / 2): the first Fourier coefficient
+
+    /// Density at `delta` from the centre [1 / radian]; delta any finite angle.
+    MEDULLA_FN T pdf(T delta) const noexcept {
+        const T x = wrap_angle(delta);
+        if (deviation <= T(1.2)) return images(x);
+        return harmonics(x);
+    }
+    /// Sum of images: at deviation 1.2 the first one left out is 7.8 deviations away (1e-13).
+    MEDULLA_FN T images(T x) const noexcept {
+        const T z = x * inverse;
+        T sum = real_math::exponential(T(-0.5) * z * z);
+        if (deviation > T(0.25)) {  // else the next image is at least 12 deviations away
+            const T turn = T(2 * pi) * inverse, p = z + turn, q = z - turn;
+            sum += real_math::exponential(T(-0.5) * p * p) + real_math::exponential(T(-0.5) * q * q);
+        }
+        return peak * sum;
+    }
+    /// Theta series: sum of damping^(n^2) cos(n x); at deviation 1.2 the sixth term is 6e-12.
+    MEDULLA_FN T harmonics(T x) const noexcept {
+        const T c = std::cos(x), d2 = damping * damping;
+        T before = T(1), now = c, power = damping, ratio = damping * d2, sum = T(0);
+        for (int n = 1; n <= 5; ++n) {
+            sum += power * now;
+            const T next = T(2) * c * now - before;
+            before = now, now = next;
+            power *= ratio, ratio *= d2;
+        }
+        return (T(1) + T(2) * sum) * T(1 / (2 * pi));
+    }
+};
+
+template <class T>
+MEDULLA_FN WrappedGaussian<T> wrapped_gaussian(T deviation) noexcept {
+    const T inverse = T(1) / deviation;
+    return {deviation, inverse, T(0.39894228040143268) * inverse, std::exp(T(-0.5) * deviation * deviation)};
+}
+
+/// Draws an angle from the centre of the wrapped Gaussian (Box and Muller 1958), in [-pi, pi].
+/// @param u uniform in [0, 1)  @param v uniform in [0, 1)
+template <class T>
+MEDULLA_FN T sample(const WrappedGaussian<T>& gaussian, T u, T v) noexcept {
+    const T radius = std::sqrt(T(-2) * std::log(T(1) - u));  // 1 - u > 0
+    return wrap_angle(gaussian.deviation * radius * std::cos(T(2 * pi) * v));
+}
+
+}  // namespace medulla

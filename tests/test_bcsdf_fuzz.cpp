@@ -1,0 +1,111 @@
+// Random, extreme and bit-pattern inputs through every door of the BCSDF: finite and >= 0, whatever comes in.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <random>
+
+#include "analytic_pack.hpp"
+#include "medulla/medulla.hpp"
+
+using namespace medulla;
+
+namespace {
+
+class Inputs {
+  public:
+    explicit Inputs(unsigned seed) : engine_(seed) {}
+    float uniform() { return float(engine_() >> 40) * 0x1p-24f; }
+    /// A number in or about [low, high], one of the extremes, or any 32 bits.
+    float any(float low, float high) {
+        const float extremes[] = {0.0f,        -0.0f,       1e-45f,   1.17549435e-38f, 1e-20f,      0.99999994f,
+                                  1.0f,        1.00000012f, -1.0f,    1.57079625f,     1.57079637f, -1.57079637f,
+                                  3.14159274f, 3.4e38f,     -3.4e38f, INFINITY,        -INFINITY,   NAN};
+        switch (engine_() % 8) {
+            case 0:
+                return extremes[engine_() % (sizeof extremes / sizeof extremes[0])];
+            case 1: {
+                const auto bits = std::uint32_t(engine_());
+                float x;
+                std::memcpy(&x, &bits, sizeof x);
+                return x;
+            }
+            case 2:
+                return engine_() % 2 ? low : high;
+            case 3:
+                return std::nextafter(engine_() % 2 ? low : high, engine_() % 2 ? -1e9f : 1e9f);
+            default:
+                return low + (high - low) * uniform();
+        }
+    }
+    /// As `any`, but mostly inside, so that a whole fibre of eleven numbers is often usable.
+    float mostly(float low, float high) {
+        return engine_() % 16 ? low + (high - low) * (engine_() % 4 ? uniform() : float(engine_() % 2))
+                              : any(low, high);
+    }
+
+  private:
+    std::mt19937_64 engine_;
+};
+
+bool good(float x) { return x >= 0 && x <= 3.4e38f; }
+
+}  // namespace
+
+TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
+    const analytic::AnalyticPack pack;
+    const char* wanted = std::getenv("MEDULLA_FUZZ");  // fibres; each asks 64 near exits, 2 far exits, 8 samples
+    const long fibres = wanted ? std::atol(wanted) : 2500;
+    Inputs in(7);
+    long usable_fibres = 0, evaluated = 0, bright = 0, bad = 0;
+    for (long i = 0; i < fibres; ++i) {
+        FurParameters<3> p;
+        p.eta = in.mostly(1.0001f, 2.5f), p.kappa = in.mostly(0, 1), p.alpha = in.mostly(-0.3f, 0.3f);
+        p.beta_m = in.mostly(0.00174533f, 1.05f), p.beta_n = in.mostly(0.00174533f, 1.05f), p.layers = in.mostly(0, 5);
+        p.sigma_ms = in.mostly(0, 10), p.sigma_ma = in.mostly(0, 3), p.g = in.mostly(-0.95f, 0.95f);
+        for (float& s : p.sigma_ca) s = in.mostly(0, 5);
+        FurFibre<3> fibre;
+        usable_fibres += usable(prepare(p, pack.view, fibre));
+        const auto check = [&](float x, const char* what) {
+            ++evaluated, bright += x > 0;
+            if (good(x)) return;
+            if (++bad < 10)
+                UNSCOPED_INFO(what << " " << x << ": eta " << p.eta << " kappa " << p.kappa << " beta " << p.beta_m
+                                   << " " << p.beta_n << " layers " << p.layers << " sigma " << p.sigma_ms << " g "
+                                   << p.g << " alpha " << p.alpha);
+        };
+        for (int k = 0; k < 8; ++k) {
+            const float theta_i = in.any(-1.5707f, 1.5707f), h = in.any(-1, 1);
+            NearField<3> near;
+            near_field(fibre, theta_i, h, near);
+            for (int j = 0; j < 8; ++j)
+                for (float x : near.eval(in.any(-1.5707f, 1.5707f), in.any(-7, 7)).value) check(x, "near");
+            if (k < 1) {
+                NearSampler<3> sampler;
+                sampler.prepare(near);
+                for (int j = 0; j < 8; ++j) {
+                    const auto s =
+                        sampler.sample({in.uniform(), in.uniform(), in.uniform(), in.uniform(), in.uniform()});
+                    check(s.pdf, "pdf");
+                    for (float w : s.weight) check(w, "weight");
+                }
+                check(sampler.pdf(in.any(-1.5f, 1.5f), in.any(-3, 3)), "pdf");
+                FarField<3> far;
+                far_field(fibre, theta_i, {in.any(-1, 0), in.any(0, 1)}, far);
+                for (float x : far.eval(in.any(-1.5707f, 1.5707f), in.any(-7, 7)).value) check(x, "far");
+                FarSampler<3> far_sampler;
+                far_sampler.prepare(far);
+                const auto s =
+                    far_sampler.sample({in.uniform(), in.uniform(), in.uniform(), in.uniform(), in.uniform()});
+                check(s.pdf, "far pdf");
+                for (float w : s.weight) check(w, "far weight");
+            }
+        }
+        const Vector<float> a = {in.any(-1, 1), in.any(-1, 1), in.any(-1, 1)},
+                            b = {in.any(-1, 1), in.any(-1, 1), in.any(-1, 1)};
+        for (float x : eval(fibre, a, b, in.any(-1, 1)).value) check(x, "directions");
+    }
+    CHECK(bad == 0);
+    CHECK(usable_fibres > fibres / 4);
+    CHECK(bright > evaluated / 20);
+}

@@ -1,0 +1,261 @@
+// sample against pdf: chi-squared over random furs, a broken pdf that must fail, furnace, weights, frame.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+#include <vector>
+
+#include "analytic_pack.hpp"
+#include "medulla/medulla.hpp"
+
+using namespace medulla;
+using analytic::AnalyticPack;
+
+namespace {
+
+const AnalyticPack& pack() {
+    static const AnalyticPack p;
+    return p;
+}
+
+struct Random {
+    std::mt19937_64 engine;
+    float uniform() { return float(engine() >> 40) * 0x1p-24f; }
+    RandomNumbers numbers() {
+        RandomNumbers u;
+        u.lobe = uniform(), u.azimuth = uniform(), u.azimuth2 = uniform(), u.longitude = uniform(),
+        u.offset = uniform();
+        return u;
+    }
+};
+
+FurParameters<3> random_fur(Random& r, int i) {
+    FurParameters<3> p = parameters_of<3>(fur_presets[i % fur_preset_count]);
+    p.g = std::min(p.g, 0.6f);
+    if (i % 2 == 0) return p;
+    p.eta = 1.01f + 1.49f * r.uniform(), p.kappa = r.uniform(), p.layers = 5 * r.uniform();
+    p.beta_n = 0.05f * std::pow(20.0f, r.uniform()), p.beta_m = 0.05f * std::pow(20.0f, r.uniform());
+    p.sigma_ms = 5 * r.uniform(), p.sigma_ma = r.uniform() * r.uniform(), p.sigma_ca[0] = r.uniform();
+    p.g = 1.2f * r.uniform() - 0.6f;
+    return p;
+}
+
+/// Upper tail of the chi-squared distribution by the Wilson-Hilferty cube root, good to 1e-3 in the tail used here for
+/// the hundred and more degrees of freedom of a grid.
+double chi_squared_tail(double statistic, double degrees) {
+    const double z = (std::cbrt(statistic / degrees) - 1 + 2 / (9 * degrees)) / std::sqrt(2 / (9 * degrees));
+    return 0.5 * std::erfc(z / std::sqrt(2.0));
+}
+
+constexpr int rows = 24, columns = 32;
+
+/// Expected share of each bin, in coordinates (theta, phi), by `n` Gauss nodes a side and `split` pieces a side.
+template <class Pdf>
+std::vector<double> expected_shares(Pdf&& pdf, int split) {
+    std::vector<double> share(rows * columns, 0.0);
+    const GaussRule rule = gauss_rule(0);
+    for (int i = 0; i < rows * split; ++i)
+        for (int j = 0; j < columns * split; ++j) {
+            double sum = 0;
+            for (int a = 0; a < 6; ++a)
+                for (int b = 0; b < 6; ++b) {
+                    const double x = a & 1 ? double(rule.x[a / 2]) : -double(rule.x[a / 2]),
+                                 y = b & 1 ? double(rule.x[b / 2]) : -double(rule.x[b / 2]);
+                    const double theta = pi * ((i + 0.5 + 0.5 * x) / (rows * split) - 0.5),
+                                 phi = pi * (2 * (j + 0.5 + 0.5 * y) / (columns * split) - 1);
+                    sum += double(rule.w[a / 2]) * double(rule.w[b / 2]) / 4 * double(pdf(float(theta), float(phi)));
+                }
+            share[std::size_t((i / split) * columns + j / split)] +=
+                sum * (pi / (rows * split)) * (2 * pi / (columns * split));
+        }
+    return share;
+}
+
+/// p-value of `counts` against `share`; bins of fewer than 10 expected are pooled.
+double chi_squared(const std::vector<double>& share, const std::vector<int>& counts, int samples) {
+    double statistic = 0, pooled = 0, seen = 0;
+    int degrees = -1;
+    for (std::size_t i = 0; i < share.size(); ++i) {
+        const double e = share[i] * samples;
+        if (e < 10) {
+            pooled += e, seen += counts[i];
+            continue;
+        }
+        statistic += (counts[i] - e) * (counts[i] - e) / e, ++degrees;
+    }
+    if (pooled > 10) statistic += (seen - pooled) * (seen - pooled) / pooled, ++degrees;
+    return degrees > 0 ? chi_squared_tail(statistic, degrees) : 1;
+}
+
+struct Drawn {
+    std::vector<int> counts = std::vector<int>(rows * columns, 0);
+    float largest_weight = 0;
+    double mean_weight = 0;
+};
+
+template <class Sampler>
+Drawn draw(const Sampler& sampler, Random& r, int samples) {
+    Drawn d;
+    for (int s = 0; s < samples; ++s) {
+        const FurSample<3> x = sampler.sample(r.numbers());
+        REQUIRE(x.valid);
+        const int i = std::min(rows - 1, int((double(x.theta_r) / pi + 0.5) * rows)),
+                  j = std::min(columns - 1, std::max(0, int((double(x.phi) / pi + 1) / 2 * columns)));
+        ++d.counts[std::size_t(std::max(0, i) * columns + j)];
+        for (float w : x.weight) d.largest_weight = std::max(d.largest_weight, w);
+        d.mean_weight += double(x.weight[0]) / samples;
+    }
+    return d;
+}
+
+int from_environment(const char* name, int otherwise) {
+    const char* text = std::getenv(name);
+    return text ? std::atoi(text) : otherwise;
+}
+
+}  // namespace
+
+TEST_CASE("near samples pass chi-squared with Sidak's correction, a broken pdf fails", "[bcsdf]") {
+    const int cases = from_environment("MEDULLA_CHI_CASES", 8),
+              samples = from_environment("MEDULLA_CHI_SAMPLES", 100000);
+    const double level = 1 - std::pow(1 - 0.01, 1.0 / cases);
+    Random r{std::mt19937_64(11)};
+    int passed = 0, broken_caught = 0;
+    float largest = 0;
+    for (int i = 0; i < cases; ++i) {
+        const FurParameters<3> p = random_fur(r, i);
+        FurFibre<3> fibre;
+        REQUIRE(usable(prepare(p, pack().view, fibre)));
+        NearField<3> near;
+        near_field(fibre, i % 8 == 7 ? 1.52f : 2.8f * (r.uniform() - 0.5f), 2 * r.uniform() - 1, near);
+        NearSampler<3> sampler;
+        sampler.prepare(near);
+        const Drawn d = draw(sampler, r, samples);
+        const auto share = expected_shares([&](float t, float f) { return sampler.pdf_angular(t, f); }, 3);
+        double whole = 0;
+        for (double x : share) whole += x;
+        CHECK(whole == Approx(1).epsilon(2e-4));  // Gauss nodes against kinks at the tables' knots
+        const double value = chi_squared(share, d.counts, samples);
+        if (value > level)
+            ++passed;
+        else
+            std::printf("near case %d: p-value %.2g\n", i, value);
+        // Broken: lobe R is said to be half as likely as it is drawn (its share goes to the others).
+        NearSampler<3> broken = sampler;
+        const float moved = 0.5f * broken.shares.share[0];
+        broken.shares.share[0] -= moved, broken.shares.share[near.scattered ? 3 : 1] += moved;
+        const auto wrong = expected_shares([&](float t, float f) { return broken.pdf_angular(t, f); }, 3);
+        if (!(chi_squared(wrong, d.counts, samples) > level)) ++broken_caught;
+        largest = std::max(largest, d.largest_weight);
+        // The mean weight of channel 0 is its energy: 4 deviations of a mean of weights below 2.
+        double energy = 0;
+        for (int k = 0; k < (near.scattered ? 5 : 3); ++k) energy += double(near.energy.A[k][0]);
+        CHECK(d.mean_weight == Approx(energy).margin(8 / std::sqrt(double(samples))));
+    }
+    CHECK(passed == cases);
+    CHECK(broken_caught >= cases - 1 - cases / 20);  // but where R itself is nearly absent
+    CHECK(largest < 3 * 1.5f);  // the bound: channels times the table's overshoot between its knots
+    std::printf("near: %d of %d pass chi-squared, %d of %d broken ones caught, largest weight %.3f\n", passed, cases,
+                broken_caught, cases, double(largest));
+}
+
+TEST_CASE("far samples pass chi-squared", "[bcsdf]") {
+    const int cases = from_environment("MEDULLA_CHI_CASES", 4),
+              samples = from_environment("MEDULLA_CHI_SAMPLES", 40000);
+    const double level = 1 - std::pow(1 - 0.01, 1.0 / cases);
+    Random r{std::mt19937_64(12)};
+    int passed = 0;
+    float largest = 0;
+    for (int i = 0; i < cases; ++i) {
+        const FurParameters<3> p = random_fur(r, i + 3);
+        FurFibre<3> fibre;
+        REQUIRE(usable(prepare(p, pack().view, fibre)));
+        FarField<3> far;
+        const float low = i % 2 ? 1.9f * r.uniform() - 1 : -1, high = i % 2 ? low + (1 - low) * r.uniform() : 1;
+        far_field(fibre, 2.4f * (r.uniform() - 0.5f), {low, high}, far);
+        FarSampler<3> sampler;
+        sampler.prepare(far);
+        const Drawn d = draw(sampler, r, samples);
+        // pdf_angular is separable by lobe, but the test asks it as a renderer would: a coarser grid of nodes.
+        const auto share = expected_shares([&](float t, float f) { return sampler.pdf_angular(t, f); }, 1);
+        const double value = chi_squared(share, d.counts, samples);
+        if (value > level)
+            ++passed;
+        else
+            std::printf("far case %d: p-value %.2g\n", i, value);
+        largest = std::max(largest, d.largest_weight);
+    }
+    CHECK(passed == cases);
+    std::printf("far: %d of %d pass chi-squared, largest weight %.3f\n", passed, cases, double(largest));
+}
+
+TEST_CASE("truncated Gaussians are drawn as they are dense, also where the centre is outside", "[bcsdf]") {
+    // In double, since a float angle cannot resolve the layer of 3e-6 that is left of the narrowest lobe at the edge.
+    for (double centre : {0.0, 1.4, -1.5, 1.6, -1.9, 3.0})
+        for (double deviation : {0.002, 0.1, 0.6, 1.5}) {
+            const auto gaussian = truncated_gaussian(centre, deviation);
+            // Between the images of i/64 and (i+1)/64 lies a mass of 1/64. The sampler stops at 2e-6 of the deviation
+            // or of the edge's layer: against a 64-quantile that is at most 2e-4 of its mass; midpoints add (1/200)^2.
+            for (int i = 1; i < 63; ++i) {
+                const double a = sample(gaussian, i / 64.0), b = sample(gaussian, (i + 1) / 64.0);
+                double piece = 0;
+                for (int k = 0; k < 200; ++k) piece += gaussian.pdf(a + (b - a) * (k + 0.5) / 200) * (b - a) / 200;
+                CHECK(piece == Approx(1.0 / 64).epsilon(4e-4));
+            }
+            CHECK(std::abs(sample(gaussian, 0.0)) <= pi / 2);
+            CHECK(std::abs(sample(gaussian, 1 - 1e-9)) <= pi / 2);
+            const auto narrow = truncated_gaussian(float(centre), float(deviation));
+            CHECK(double(narrow.pdf(float(sample(gaussian, 0.3)))) ==
+                  Approx(gaussian.pdf(sample(gaussian, 0.3))).epsilon(1e-4 + 2e-7 / deviation * (3 + gaussian.beyond)));
+        }
+}
+
+TEST_CASE("white furnace: near and far return their energies, never above 1", "[bcsdf]") {
+    Random r{std::mt19937_64(13)};
+    double least = 2, most = 0;
+    for (int i = 0; i < from_environment("MEDULLA_FURNACE_CASES", 6); ++i) {
+        FurParameters<3> p = random_fur(r, i);
+        p.sigma_ma = p.sigma_ca[0] = p.sigma_ca[1] = p.sigma_ca[2] = 0;
+        p.beta_m = std::max(p.beta_m, 0.05f), p.beta_n = std::max(p.beta_n, 0.05f);
+        FurFibre<3> fibre;
+        prepare(p, pack().view, fibre);
+        FarField<3> far;
+        far_field(fibre, 3.0f * (r.uniform() - 0.5f), {-1, 1}, far);
+        // M and N factor but for M^s, linear in |phi|: its integral over theta_r is 1 at every phi.
+        double sum = 0;
+        for (int j = 0; j < 128; ++j) {
+            const auto l = far.lobes(0.0f, float(pi * (2 * (j + 0.5) / 128 - 1)));
+            for (int k = 0; k < lobe_count; ++k) sum += double(l.N[k][0]) * 2 * pi / 128;
+        }
+        least = std::min(least, sum), most = std::max(most, sum);
+        CHECK(sum <= 1.001);  // the far field's own error
+        CHECK(sum >= 0.7);
+    }
+    std::printf("white furnace, far field: %.4f to %.4f\n", least, most);
+}
+
+TEST_CASE("directions, offsets and coverage", "[bcsdf]") {
+    for (float theta : {-1.5f, -0.3f, 0.0f, 1.2f})
+        for (float phi : {-3.0f, 0.0f, 1.0f}) {
+            const Angles<float> a = angles_of(direction_of(Angles<float>{theta, phi}));
+            CHECK(a.theta == Approx(theta).margin(2e-6));
+            CHECK(a.phi == Approx(phi).margin(2e-6));
+        }
+    // Light from +y travels towards -y; its left normal (counter-clockwise by 90 degrees) is -z.
+    CHECK(offset_of(Vector<float>{0, 1, 0}, Vector<float>{0, 5, -0.3f}) == Approx(0.3));
+    const OffsetRange c = pixel_coverage(0.8f, 2.0f, 4.0f, 0.9f);
+    CHECK(c.low == Approx(0.8 - 0.225));
+    CHECK(c.high == 1.0f);
+    CHECK(pixel_coverage(0.1f, 1e9f, 1e-3f, 1.0f).low == -1.0f);
+    // R of a ray at h > 0 leaves at phi = -2 gamma_i: on the side it came in on (left of the light when seen along it).
+    FurFibre<3> fibre;
+    FurParameters<3> p = parameters_of<3>(*find_preset("human"));
+    prepare(p, pack().view, fibre);
+    const auto here = near_lobes(fibre, 0.0f, 0.0f, -2 * std::asin(0.5f), 0.5f),
+               there = near_lobes(fibre, 0.0f, 0.0f, 2 * std::asin(0.5f), 0.5f);
+    CHECK(here.N[0][0] > 1e3f * there.N[0][0]);
+    const auto value = eval(fibre, Vector<float>{0.6f, 0.8f, 0}, Vector<float>{-0.6f, 0, 0.8f}, -0.3f);
+    CHECK(value.value[1] ==
+          Approx(eval(fibre, std::asin(0.6f), -std::asin(0.6f), float(pi / 2), -0.3f).value[1]).epsilon(1e-4));
+}

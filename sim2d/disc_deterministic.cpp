@@ -23,8 +23,8 @@ void require(bool condition, const char* what) {
 }
 
 /// Coefficients c_k / E at the offset h, by a polynomial in asin h through the eight nearest chords, those of -h
-/// included: I(-b, -phi) = I(b, phi). Near |h| = 1 the stencil ends at the last chord and extrapolates half a gap.
-std::vector<Complex> at_offset(const DiscExit& exit, double sigma, double h) {
+/// included: I(-b, -phi) = I(b, phi). Near |h| = 1 the stencil ends at the tangent chord.
+std::vector<Complex> at_offset(const DiscExit& exit, double h) {
     const std::size_t count = exit.offset.size(), taps = std::min<std::size_t>(8, 2 * count);
     // Chord t of -count .. count - 1: mirrored for t < 0.
     const auto beta = [&](std::ptrdiff_t t) {
@@ -43,9 +43,8 @@ std::vector<Complex> at_offset(const DiscExit& exit, double sigma, double h) {
             if (const std::ptrdiff_t u = start + static_cast<std::ptrdiff_t>(o); u != t)
                 weight *= (x - beta(u)) / (beta(t) - beta(u));
         const std::size_t chord = static_cast<std::size_t>(t < 0 ? -1 - t : t);
-        weight /= disc_energy(sigma, exit.offset[chord]);
         for (std::size_t k = 0; k < exit.modes; ++k) {
-            const Complex value = exit.radiance[chord * exit.modes + k];
+            const Complex value = exit.lobes[chord * exit.modes + k];
             c[k] += weight * (t < 0 ? std::conj(value) : value);
         }
     }
@@ -131,9 +130,9 @@ std::vector<Profile> DiscSolver::solve(double sigma, const std::vector<double>& 
         profile.lobe = disc_single_lobe(sigma, shared_->g, offset, bins);
         std::vector<double> difference(bins);
         if (sigma > 0) {
-            std::vector<Complex> c = at_offset(fine, sigma, offset);
+            std::vector<Complex> c = at_offset(fine, offset);
             if (two_grids) {
-                std::vector<Complex> d = at_offset(coarse, sigma, offset);
+                std::vector<Complex> d = at_offset(coarse, offset);
                 d.resize(c.size());
                 for (std::size_t k = 0; k < c.size(); ++k) d[k] = c[k] - d[k];
                 add_modes(d, difference);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim2d/disc_single.hpp"
+
 namespace medulla::sim2d {
 namespace {
 
@@ -143,6 +145,23 @@ class Transport {
                 out.noalias() = sigma_ / (2 * pi) *
                                 (Eigen::Map<const Matrix>(grid_.waves(i, part).data(), count, orders) * shifted);
             }
+    }
+
+    /// Mode k of a source at the rim, psi = pi / 2.
+    std::complex<double> grazing(const Field& source, std::size_t k) const {
+        const std::size_t i = grid_.circles() - 1, count = grid_.chords(i);
+        std::complex<double> value = 0;
+        for (std::size_t a = count - 4; a < count; ++a) {
+            double weight = 1;
+            const double x = 0.5 * pi - grid_.psi[grid_.first[i] + a];
+            for (std::size_t c = count - 4; c < count; ++c) {
+                const double y = 0.5 * pi - grid_.psi[grid_.first[i] + c];
+                if (c != a) weight *= y * y / ((y - x) * (y + x));
+            }
+            value += weight * std::complex<double>(source[row(i, real_sum, a) * grid_.stride + k],
+                                                   source[row(i, imaginary_sum, a) * grid_.stride + k]);
+        }
+        return value;
     }
 
   private:
@@ -362,9 +381,16 @@ DiscExit solve_disc_transport(const DiscGrid& grid, double sigma) {
     transport.stream(many, radiance, stride, rows.data());
     exit.offset = grid.offset;
     exit.modes = stride;
-    for (std::size_t m = 0; m < grid.offset.size(); ++m)
+    for (std::size_t m = 0; m < grid.offset.size(); ++m) {
+        const double energy = disc_energy(sigma, grid.offset[m]);
         for (std::size_t k = 0; k < stride; ++k)
-            exit.radiance.emplace_back(rows[2 * m * stride + k], rows[(2 * m + 1) * stride + k]);
+            exit.lobes.emplace_back(rows[2 * m * stride + k] / energy, rows[(2 * m + 1) * stride + k] / energy);
+    }
+    // Tangent chord: I / E -> J(r = 1, psi = pi / 2) / sigma. A source is smooth there, its sum parts are even about
+    // pi / 2 and its difference parts 0: a cubic in (pi / 2 - psi)^2.
+    exit.offset.push_back(1);
+    for (std::size_t k = 0; k < stride; ++k)
+        exit.lobes.push_back(transport.grazing(many, k) / sigma * std::polar(1.0, 0.5 * pi * static_cast<double>(k)));
     return exit;
 }
 

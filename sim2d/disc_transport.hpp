@@ -8,12 +8,12 @@
 
 namespace medulla::sim2d {
 
-/// Light scattered at least twice that leaves the disc, by rim chord and mode:
-/// I(b, phi) = c_0 + 2 Re sum over k >= 1 of c_k exp(i k phi).
+/// Light scattered at least twice that leaves the disc, by chord and mode, divided by E = 1 - exp(-2 sigma sqrt(1 -
+/// b^2)): I(b, phi) / E = c_0 + 2 Re sum over k >= 1 of c_k exp(i k phi).
 struct DiscExit {
-    std::vector<double> offset;                  ///< b of the chords, increasing, in (0, 1)
-    std::vector<std::complex<double>> radiance;  ///< c_k of chord m at m * modes + k
-    std::size_t modes = 0;                       ///< number of modes, k = 0 included
+    std::vector<double> offset;               ///< b of the chords, increasing, in (0, 1]; the last is the tangent b = 1
+    std::vector<std::complex<double>> lobes;  ///< c_k of chord m at m * modes + k
+    std::size_t modes = 0;                    ///< number of modes, k = 0 included
     int iterations = 0;
     double residual = 0;  ///< relative to the right-hand side, the worst mode
 };

@@ -73,6 +73,13 @@ Matrix analyse(const double* psi, std::ptrdiff_t count, DiscPart part, const std
     return coefficients;
 }
 
+std::vector<DiscReal> rounded(const Matrix& matrix) {
+    std::vector<DiscReal> values;
+    values.reserve(static_cast<std::size_t>(matrix.size()));
+    for (Eigen::Index i = 0; i < matrix.size(); ++i) values.push_back(static_cast<DiscReal>(matrix.data()[i]));
+    return values;
+}
+
 }  // namespace
 
 DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : size(wanted) {
@@ -95,8 +102,8 @@ DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : size(wanted) {
     sine.resize(nodes() * stride);
     for (std::size_t node = 0; node < nodes(); ++node)
         for (std::size_t k = 0; k < stride; ++k) {
-            cosine[node * stride + k] = std::cos(static_cast<double>(k) * psi[node]);
-            sine[node * stride + k] = std::sin(static_cast<double>(k) * psi[node]);
+            cosine[node * stride + k] = static_cast<DiscReal>(std::cos(static_cast<double>(k) * psi[node]));
+            sine[node * stride + k] = static_cast<DiscReal>(std::sin(static_cast<double>(k) * psi[node]));
         }
     harmonics = g == 0 ? 0 : static_cast<int>(std::ceil(std::log(1e-8) / std::log(std::abs(g))));
     for (std::size_t i = 0; i < circle_count; ++i)
@@ -111,9 +118,11 @@ DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : size(wanted) {
                     const double angle = order * psi[first[i] + static_cast<std::size_t>(m)];
                     wave(m, c) = std::pow(g, order) * (cosines ? std::cos(angle) : std::sin(angle));
                 }
-            const Matrix product = wave * analyse(&psi[first[i]], count, part, n, i + 1 == circle_count);
-            waves_.emplace_back(wave.data(), wave.data() + wave.size());
-            scatter_.emplace_back(product.data(), product.data() + product.size());
+            const Matrix coefficients = analyse(&psi[first[i]], count, part, n, i + 1 == circle_count);
+            waves_.push_back(rounded(wave));
+            const bool factored = 2 * wave.cols() < count;
+            analysis_.push_back(factored ? rounded(coefficients) : std::vector<DiscReal>());
+            scatter_.push_back(factored ? std::vector<DiscReal>() : rounded(wave * coefficients));
         }
 }
 

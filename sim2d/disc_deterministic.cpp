@@ -73,16 +73,25 @@ void add_modes(const std::vector<Complex>& c, std::vector<double>& lobe) {
     }
 }
 
+/// Measured, for 1e-3 or better over sigma <= 16, 0 <= g <= 0.95: the radial step follows the layer 1 / sigma under the
+/// rim, the gap the width of the phase function, the modes both.
 DiscGridSize automatic(double sigma, double g, const DiscOptions& options) {
+    const double width = 1 - std::abs(g), root = std::sqrt(sigma);
     DiscGridSize size;
-    size.circles = options.circles > 0 ? options.circles : 32;
-    size.gap = options.gap > 0 ? options.gap : 0.2;
-    size.modes = options.modes > 0 ? options.modes : 63;
-    (void)sigma, (void)g;
+    size.circles = options.circles > 0 ? options.circles : 14 + static_cast<int>(8 * std::min(root, 8.0));
+    size.gap = options.gap > 0 ? options.gap : std::clamp(1.4 * width, 0.05, 0.25);
+    const double modes = 23 + 5 * std::min(root, 8.0) + 2.3 * std::min(1 / width, 40.0);
+    size.modes = options.modes > 0 ? options.modes : static_cast<int>(modes / 8) * 8 + 7;
     return size;
 }
 
-DiscGridSize coarser(const DiscGridSize& size) { return {size.circles * 2 / 3, size.modes * 3 / 4, size.gap * 1.5}; }
+DiscGridSize coarser(const DiscGridSize& size) {
+    return {size.circles * 2 / 3, size.modes * 3 / 4, size.gap * 1.5};
+}
+
+/// The error of a grid falls about as the third power of its step: what the coarse grid misses is 1.5^3 times what the
+/// fine one does, so fine + (fine - coarse) / (1.5^3 - 1) cancels the leading term.
+const double extrapolation = 1 / (1.5 * 1.5 * 1.5 - 1);
 
 }  // namespace
 
@@ -134,7 +143,10 @@ std::vector<Profile> DiscSolver::solve(double sigma, const std::vector<double>& 
             if (two_grids) {
                 std::vector<Complex> d = at_offset(coarse, offset);
                 d.resize(c.size());
-                for (std::size_t k = 0; k < c.size(); ++k) d[k] = c[k] - d[k];
+                for (std::size_t k = 0; k < c.size(); ++k) {
+                    d[k] = extrapolation * (c[k] - d[k]);
+                    c[k] += d[k];
+                }
                 add_modes(d, difference);
             }
             add_modes(c, profile.lobe);

@@ -1,0 +1,43 @@
+// C^N of the unit disc without noise: one linear solve of the transport equation gives all h and phi of a (sigma, g).
+// docs/physics.md, sections 2 and 4. Reciprocity: C^N(phi; h) = radiance that leaves along the chord of offset h in
+// direction phi when a plane wave of unit radiance travels in direction 0.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "sim2d/profile.hpp"
+
+namespace medulla::sim2d {
+
+/// 0 means: chosen from sigma and g.
+struct DiscOptions {
+    int circles = 0;             ///< of the fine grid, >= 6
+    int modes = 0;               ///< highest k in exp(i k alpha) on the fine grid, >= 8
+    double gap = 0;              ///< largest gap between grazing directions on the fine grid [radians], > 0
+    bool estimate_error = true;  ///< solve a second, coarser grid: error estimate and extrapolation
+};
+
+/// All slices of one g; what depends on g alone is made once and shared. Threads may call `solve` at the same time;
+/// one solve runs on one thread, and its result does not depend on the others.
+class DiscSolver {
+  public:
+    /// @param g mean cosine, in (-1, 1); the automatic grids are measured for [0, 0.95]
+    explicit DiscSolver(double g, const DiscOptions& options = {});
+    ~DiscSolver();
+    DiscSolver(DiscSolver&&) noexcept;
+    DiscSolver& operator=(DiscSolver&&) noexcept;
+
+    /// One Profile per h over `bins` bins of phi.
+    /// @param sigma [1 / disc radius], >= 0   @param h offsets in [-1, 1]
+    /// energy: closed form; energy_error: what the un-normalised answer misses of it; standard_error: estimated
+    /// relative L2 error of the lobe from two grids (0 without estimate_error); mean_length is not computed (0).
+    std::vector<Profile> solve(double sigma, const std::vector<double>& h, std::size_t bins = 720) const;
+
+  private:
+    struct Shared;
+    std::unique_ptr<Shared> shared_;
+};
+
+}  // namespace medulla::sim2d

@@ -148,27 +148,38 @@ struct WrappedGaussian {
         if (deviation <= T(1.2)) return images(x);
         return harmonics(x);
     }
+    /// Density at several angles abreast.
+    template <class V>
+    MEDULLA_FN V pdf_of(V delta) const noexcept {
+        const V x = delta - V(T(2 * pi)) * nearest_integer(delta * V(T(1 / (2 * pi))));
+        return deviation <= T(1.2) ? images(x) : harmonics(x);
+    }
     /// Sum of images: at deviation 1.2 the first one left out is 7.8 deviations away (1e-13).
-    MEDULLA_FN T images(T x) const noexcept {
-        const T z = x * inverse;
-        T sum = real_math::exponential(T(-0.5) * z * z);
+    template <class V>
+    MEDULLA_FN V images(V x) const noexcept {
+        const V z = x * V(inverse);
+        V sum = real_math::exponential(V(T(-0.5)) * z * z);
         if (deviation > T(0.25)) {  // else the next image is at least 12 deviations away
-            const T turn = T(2 * pi) * inverse, p = z + turn, q = z - turn;
-            sum += real_math::exponential(T(-0.5) * p * p) + real_math::exponential(T(-0.5) * q * q);
+            const V turn = V(T(2 * pi) * inverse), p = z + turn, q = z - turn;
+            sum = sum + real_math::exponential(V(T(-0.5)) * p * p) + real_math::exponential(V(T(-0.5)) * q * q);
         }
-        return peak * sum;
+        return V(peak) * sum;
     }
     /// Theta series: sum of damping^(n^2) cos(n x); at deviation 1.2 the sixth term is 6e-12.
-    MEDULLA_FN T harmonics(T x) const noexcept {
-        const T c = std::cos(x), d2 = damping * damping;
-        T before = T(1), now = c, power = damping, ratio = damping * d2, sum = T(0);
+    template <class V>
+    MEDULLA_FN V harmonics(V x) const noexcept {
+        const auto half = real_math::sine_cosine(V(T(0.5)) * x);  // |x / 2| <= pi / 2
+        const V c = half.cosine * half.cosine - half.sine * half.sine;
+        const T d2 = damping * damping;
+        V before = V(T(1)), now = c, sum = V(T(0));
+        T power = damping, ratio = damping * d2;
         for (int n = 1; n <= 5; ++n) {
-            sum += power * now;
-            const T next = T(2) * c * now - before;
+            sum = sum + V(power) * now;
+            const V next = V(T(2)) * c * now - before;
             before = now, now = next;
             power *= ratio, ratio *= d2;
         }
-        return (T(1) + T(2) * sum) * T(1 / (2 * pi));
+        return (V(T(1)) + V(T(2)) * sum) * V(T(1 / (2 * pi)));
     }
 };
 

@@ -5,11 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "medulla/lanes.hpp"
 #include "medulla/pack.hpp"
-
-#if defined(__SSE2__)
-#include <emmintrin.h>
-#endif
 
 namespace medulla {
 
@@ -46,7 +43,7 @@ struct Contraction {
 namespace detail {
 
 /// Eight components side by side: SSE2, which every x86-64 has, or plain floats.
-#if defined(__SSE2__) && !defined(__CUDA_ARCH__) && !defined(__HIP_DEVICE_COMPILE__)
+#if defined(MEDULLA_SSE2)
 struct Eight {
     __m128 low, high;
 };

@@ -50,7 +50,7 @@ double chi_squared_tail(double statistic, double degrees) {
 
 constexpr int rows = 24, columns = 32;
 
-/// Expected share of each bin, in coordinates (theta, phi), by `n` Gauss nodes a side and `split` pieces a side.
+/// Expected share of each bin, in coordinates (theta, phi), by 8 Gauss nodes a side in `split` pieces a side.
 template <class Pdf>
 std::vector<double> expected_shares(Pdf&& pdf, int split) {
     std::vector<double> share(rows * columns, 0.0);
@@ -58,8 +58,8 @@ std::vector<double> expected_shares(Pdf&& pdf, int split) {
     for (int i = 0; i < rows * split; ++i)
         for (int j = 0; j < columns * split; ++j) {
             double sum = 0;
-            for (int a = 0; a < 6; ++a)
-                for (int b = 0; b < 6; ++b) {
+            for (int a = 0; a < 2 * rule.half; ++a)
+                for (int b = 0; b < 2 * rule.half; ++b) {
                     const double x = a & 1 ? double(rule.x[a / 2]) : -double(rule.x[a / 2]),
                                  y = b & 1 ? double(rule.x[b / 2]) : -double(rule.x[b / 2]);
                     const double theta = pi * ((i + 0.5 + 0.5 * x) / (rows * split) - 0.5),

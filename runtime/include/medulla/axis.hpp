@@ -83,7 +83,7 @@ struct Cell {
 /// The cell of `x` (a spline coordinate): wrapped on a periodic axis, else held to the axis's ends. A NaN stays NaN in
 /// `x` and takes span 0, so that it is seen in the result.
 template <class T>
-MEDULLA_FN Cell<T> locate(const AxisView<T>& axis, T x) noexcept {
+MEDULLA_HOT Cell<T> locate(const AxisView<T>& axis, T x) noexcept {
     const T lower = axis.lower(), upper = axis.upper();
     if (axis.periodic && !(x >= lower && x <= upper)) x -= std::floor((x - lower) / (upper - lower)) * (upper - lower);
     x = x < lower ? lower : (x > upper ? upper : x);
@@ -115,7 +115,7 @@ struct SplineWeights {
 
 /// Cubic B-spline basis at a cell (de Boor's recurrence, all denominators are spans of distinct breakpoints).
 template <class T>
-MEDULLA_FN SplineWeights<T> spline_weights(const AxisView<T>& axis, const Cell<T>& cell) noexcept {
+MEDULLA_HOT SplineWeights<T> spline_weights(const AxisView<T>& axis, const Cell<T>& cell) noexcept {
     const auto i = std::int32_t(cell.span);
     const T k1 = axis.breakpoint(i + 1), k2 = axis.breakpoint(i + 2), k3 = axis.breakpoint(i + 3);
     const T x = cell.x;

@@ -44,37 +44,42 @@ struct Path {
 
 /// F_1 = mean over polarisations of R + (1-R)^2 R / (1-R^2) = 2R / (1+R), F = l F_1 / (1 + (l-1) F_1) (Eq. 13).
 /// Differences are expanded so that eta' -> 1 and cos gamma_i -> 0 lose no digits (docs/bcsdf.md, 'Fresnel').
+/// T is S, or several S abreast.
 /// @param cos_i cos gamma_i  @param x sqrt(index_excess + cos_i^2) = eta' cos gamma_t
-template <class T>
-MEDULLA_FN Cuticle<T> cuticle(T layers, T index_excess, T cos_i, T x) noexcept {
-    const T s = cos_i + x, inverse_s = T(1) / s;
-    const T index2 = T(1) + index_excess, ci = index2 * cos_i, inverse_p = T(1) / (ci + x);
-    const T rs = index_excess * inverse_s * inverse_s;
-    const T rp = index_excess * inverse_p * ((cos_i * cos_i * (index2 + T(1)) - T(1)) * inverse_p);
-    const T Rs = rs * rs, Rp = rp * rp;
-    const T Ts = T(2) * cos_i * inverse_s * (T(1) + rs);     // 1 - Rs
-    const T Tp = T(4) * (ci * inverse_p) * (x * inverse_p);  // 1 - Rp
-    const T ps = T(1) / (T(1) + Rs), pp = T(1) / (T(1) + Rp);
-    const T F1 = Rs * ps + Rp * pp, T1 = T(0.5) * (Ts * ps + Tp * pp);  // they add up to 1
+template <class T, class S>
+MEDULLA_FN Cuticle<T> cuticle(S layers, S index_excess, T cos_i, T x) noexcept {
     // Fewer layers than 1e-30 would be seen at h = 1 alone, where T1 is 0, and there 1 / (layers F1) may overflow.
-    if (!(layers > T(1e-30))) return {T(0), T(1)};
-    const T inverse = T(1) / (T1 + layers * F1);
-    return {layers * F1 * inverse, T1 * inverse};
+    if (!(layers > S(1e-30))) return {T(S(0)), T(S(1))};
+    const T one = T(S(1)), m = T(index_excess), index2 = T(S(1) + index_excess);
+    const T s = cos_i + x, p = index2 * cos_i + x, inverse = one / (s * p), inverse_s = p * inverse,
+            inverse_p = s * inverse;
+    const T rs = m * inverse_s * inverse_s;
+    const T rp = m * inverse_p * ((cos_i * cos_i * (index2 + one) - one) * inverse_p);
+    const T Rs = rs * rs, Rp = rp * rp;
+    const T Ts = T(S(2)) * cos_i * inverse_s * (one + rs);                  // 1 - Rs
+    const T Tp = T(S(4)) * (index2 * cos_i * inverse_p) * (x * inverse_p);  // 1 - Rp
+    // F1 and T1 = 1 - F1 over their common denominator (1 + Rs)(1 + Rp), which F does not see.
+    const T F1 = T(layers) * (Rs * (one + Rp) + Rp * (one + Rs));
+    const T T1 = T(S(0.5)) * (Ts * (one + Rp) + Tp * (one + Rs));
+    const T whole = one / (T1 + F1);
+    return {F1 * whole, T1 * whole};
 }
 
 /// @param cos_i cos gamma_i = sqrt(1 - h^2), given beside h because the caller often has it without cancellation
-template <class T>
-MEDULLA_FN Path<T> trace(const Inclination<T>& at, T kappa, T layers, T h, T cos_i) noexcept {
+template <class T, class S>
+MEDULLA_FN Path<T> trace(const Inclination<S>& at, S kappa, S layers, T h, T cos_i) noexcept {
     Path<T> path;
-    const T x = std::sqrt(at.index_excess + cos_i * cos_i);
-    const T sin_t = h * at.inverse_index, cos_t = x * at.inverse_index;
+    const T x = square_root(T(at.index_excess) + cos_i * cos_i), zero = T(S(0));
+    const T sin_t = h * T(at.inverse_index), cos_t = x * T(at.inverse_index);
     path.h_inside = sin_t;
     path.gamma_i = real_math::angle(h, cos_i);
     path.gamma_t = real_math::angle(sin_t, cos_t);
-    const T s2 = (kappa - sin_t) * (kappa + sin_t);
-    path.s_m = s2 > T(0) ? std::sqrt(s2) : T(0);
+    const T s2 = (T(kappa) - sin_t) * (T(kappa) + sin_t);
+    const auto inside = s2 > zero;
+    path.s_m = square_root(choose(inside, s2, zero));
     // cos gamma_t - s_m = (1 - kappa^2) / (cos gamma_t + s_m) inside the medulla: exactly 0 for kappa = 1.
-    path.s_c = path.s_m > T(0) ? (T(1) - kappa) * (T(1) + kappa) / (cos_t + path.s_m) : cos_t;
+    const T sum = choose(inside, cos_t + path.s_m, T(S(1)));
+    path.s_c = choose(inside, T((S(1) - kappa) * (S(1) + kappa)) / sum, cos_t);
     path.cuticle = cuticle(layers, at.index_excess, cos_i, x);
     return path;
 }
@@ -82,13 +87,15 @@ MEDULLA_FN Path<T> trace(const Inclination<T>& at, T kappa, T layers, T h, T cos
 /// Phi_p = 2 p gamma_t - 2 gamma_i + p pi (Eq. 15).
 template <class T>
 MEDULLA_FN T unscattered_centre(int p, T gamma_i, T gamma_t) noexcept {
-    return T(2 * p) * gamma_t - T(2) * gamma_i + T(p) * T(pi);
+    using C = Constant<T>;
+    return C::of(2 * p) * gamma_t - C::of(2) * gamma_i + C::of(p * pi);
 }
 
 /// Phi^s_p = (gamma_t - gamma_i) + (p - 1)(pi + 2 gamma_t) (Eq. 21), p = 1, 2.
 template <class T>
 MEDULLA_FN T scattered_centre(int p, T gamma_i, T gamma_t) noexcept {
-    return (gamma_t - gamma_i) + T(p - 1) * (T(pi) + T(2) * gamma_t);
+    using C = Constant<T>;
+    return (gamma_t - gamma_i) + C::of(p - 1) * (C::of(pi) + C::of(2) * gamma_t);
 }
 
 /// What the inclination decides for attenuation: coefficients over cos theta_t and T_b of Eq. 20.
@@ -114,24 +121,23 @@ MEDULLA_FN Absorption<Channels> absorption(const FurParameters<Channels>& p, flo
 
 /// Energies A of the five lobes, Eqs. 13, 14, 20; the scattered ones include E = 1 - exp(-2 s_m sigma_ms / cos
 /// theta_t), the energy of C^N, so that every lobe's azimuthal integral is its A.
-template <int Channels>
+template <int Channels, class T = float>
 struct Energies {
-    float A[lobe_count][Channels];
+    T A[lobe_count][Channels];
 };
 
-template <int Channels>
-MEDULLA_FN Energies<Channels> energies(const Path<float>& path, const Absorption<Channels>& a,
-                                       bool scattered) noexcept {
+template <int Channels, class T>
+MEDULLA_FN Energies<Channels, T> energies(const Path<T>& path, const Absorption<Channels>& a, bool scattered) noexcept {
     using real_math::exponential;
-    Energies<Channels> e;
-    const float F = path.cuticle.F, T = path.cuticle.T_;
-    const float m = exponential(-path.s_m * a.medulla_extinction);
-    const float E = scattered ? real_math::absorbed(2 * path.s_m * a.medulla_scattering) : 0.0f;
+    Energies<Channels, T> e;
+    const T F = path.cuticle.F, passed = path.cuticle.T_;
+    const T m = exponential(-path.s_m * T(a.medulla_extinction));
+    const T E = scattered ? real_math::absorbed(path.s_m * T(2 * a.medulla_scattering)) : T(0.0f);
     for (int c = 0; c < Channels; ++c) {
-        const float q = exponential(-path.s_c * a.cortex[c]), through = (q * m) * (q * m);
-        const float s = T * q * a.T_b[c] * E;
+        const T q = exponential(-path.s_c * T(a.cortex[c])), through = (q * m) * (q * m);
+        const T s = passed * q * T(a.T_b[c]) * E;
         e.A[0][c] = F;
-        e.A[1][c] = T * T * through;
+        e.A[1][c] = passed * passed * through;
         e.A[2][c] = e.A[1][c] * F * through;
         e.A[3][c] = s;
         e.A[4][c] = s * F * through;

@@ -22,10 +22,10 @@ enum class FarQuality : int { draft = -1, standard = 0, fine = 1 };
 namespace detail {
 
 inline constexpr int most_cuts = 40;
-/// Deviations to either side of a Gaussian's centre within which it is integrated: 7e-6 of it lies outside.
-inline constexpr float reach = 4.5f;
-/// Above this deviation [radians] the whole circle is within reach of every offset, and none is skipped.
-inline constexpr float wide_deviation = 0.35f;
+/// Deviations to either side of a Gaussian's centre within which it is integrated: 1.4e-4 of it lies outside.
+inline constexpr float reach = 3.8f;
+/// Above this deviation [radians] the whole circle is within reach, nearly, and no offset is skipped.
+inline constexpr float wide_deviation = 0.8f;
 
 /// Offsets in gamma_i = asin h, in ascending order, where a lobe's integrand changes character: the range's ends, the
 /// medulla's rim, the grading towards the fibre's rim, the caustic of TRT. Between two cuts Phi_p is monotone.
@@ -76,21 +76,33 @@ struct FarField {
 
 namespace detail {
 
-/// A point of the quadrature: h, cos gamma_i, and dh over the variable that is stepped.
+/// A point of the quadrature, or four: h, cos gamma_i, and dh over the variable that is stepped.
+template <class T>
 struct Offset {
-    float h, cos_i, dh;
+    T h, cos_i, dh;
 };
 
 /// Stepping psi inside the medulla, h = rim sin(psi): s_m = kappa cos(psi) is then smooth at the medulla's rim.
 /// Outside, and where the medulla reaches the fibre's rim, psi is gamma_i itself.
-MEDULLA_FN Offset offset_inside(float rim, float psi) noexcept {
+template <class T>
+MEDULLA_FN Offset<T> offset_inside(float rim, T psi) noexcept {
     const auto sc = real_math::sine_cosine(psi);
-    const float h = rim * sc.sine;
-    return {h, std::sqrt((1 - h) * (1 + h)), rim * sc.cosine};
+    const T h = T(rim) * sc.sine;
+    return {h, square_root((T(1.0f) - h) * (T(1.0f) + h)), T(rim) * sc.cosine};
 }
-MEDULLA_FN Offset offset_at_angle(float gamma) noexcept {
+template <class T>
+MEDULLA_FN Offset<T> offset_at_angle(T gamma) noexcept {
     const auto sc = real_math::sine_cosine(gamma);
     return {sc.sine, sc.cosine, sc.cosine};
+}
+
+/// Nodes 4 j .. 4 j + 3 of a rule over middle +- half, and their weights.
+MEDULLA_FN Four rule_nodes(const GaussRule& rule, int j, float middle, float half) noexcept {
+    const float a = half * rule.x[2 * j], b = half * rule.x[2 * j + 1];
+    return Four(middle - a, middle + a, middle - b, middle + b);
+}
+MEDULLA_FN Four rule_weights(const GaussRule& rule, int j) noexcept {
+    return Four(rule.w[2 * j], rule.w[2 * j], rule.w[2 * j + 1], rule.w[2 * j + 1]);
 }
 
 /// Phi_p as a function of gamma_i, and its slope.
@@ -149,29 +161,29 @@ MEDULLA_FN void integrate_piece(const FarField<Channels>& far, float a, float b,
     const float middle = 0.5f * (a + b), half = 0.5f * (b - a);
     const int index = rule_index + far.quality;
     const GaussRule rule = gauss_rule(index < 0 ? 0 : (index >= gauss_rules ? gauss_rules - 1 : index));
-    for (int i = 0; i < 2 * rule.half; ++i) {
-        const int k = i >> 1;
-        const float t = middle + half * (i & 1 ? rule.x[k] : -rule.x[k]);
-        const Offset at = inside ? offset_inside(far.rim, t) : offset_at_angle(t);
-        visit(trace(m.at, p.kappa, p.layers, at.h, at.cos_i), rule.w[k] * half * at.dh * far.inverse_width);
+    for (int j = 0; 2 * j < rule.half; ++j) {
+        const Four t = rule_nodes(rule, j, middle, half);
+        const Offset<Four> at = inside ? offset_inside(far.rim, t) : offset_at_angle(t);
+        visit(trace(m.at, p.kappa, p.layers, at.h, at.cos_i),
+              rule_weights(rule, j) * Four(half * far.inverse_width) * at.dh);
     }
 }
 
-/// Gauss rule for `deviations` of a Gaussian under one piece: errors of 1e-4 and less (docs/bcsdf.md).
+/// Gauss rule for `deviations` of a Gaussian under one piece: errors of 3e-4 and less (docs/bcsdf.md).
 MEDULLA_FN int rule_for(float deviations) noexcept {
-    return deviations < 4 ? 0 : (deviations < 10 ? 1 : (deviations < 19 ? 2 : 3));
+    return deviations < 8 ? 0 : (deviations < 12 ? 1 : (deviations < 19 ? 2 : 3));
 }
 
-/// Calls visit(path, weight, D) at every node in reach of phi for lobe p = 0, 1, 2: the average over the range of any
-/// amplitude(h) D_p(h, phi) is the sum of weight * amplitude(path) * D.
+/// Calls visit(path, weight, D) for every four nodes in reach of phi for lobe p = 0, 1, 2: the average over the range
+/// of any amplitude(h) D_p(h, phi) is the sum of weight * amplitude(path) * D.
 template <int Channels, class Visit>
 MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float phi, Visit&& visit) noexcept {
     const Inclination<float>& at = far.near.longitudinal.at;
     const WrappedGaussian<float>& gaussian = far.fibre().azimuthal_gaussian[p];
     const Cuts& cuts = far.cuts[p];
     const float s = gaussian.deviation, wide = reach * s;
-    const auto node = [&](const Path<float>& path, float weight) {
-        visit(path, weight, gaussian.pdf(phi - unscattered_centre(p, path.gamma_i, path.gamma_t)));
+    const auto node = [&](const Path<Four>& path, Four weight) {
+        visit(path, weight, gaussian.pdf_of(Four(phi) - unscattered_centre(p, path.gamma_i, path.gamma_t)));
     };
     float a = cuts.gamma[0];
     Exit at_a = exit_of(p, at.inverse_index, at.index_excess, a);
@@ -183,7 +195,7 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
             slope = std::fmax(slope, std::abs(exit_of(p, at.inverse_index, at.index_excess, 0.0f).slope));
         if (s > wide_deviation) {
             const int rule = rule_for(slope * (b - a) / s);
-            integrate_piece(far, a, b, rule < 1 && b - a > 0.3f ? 1 : rule, node);
+            integrate_piece(far, a, b, rule, node);
         } else {
             const float low = std::fmin(at_a.phi, at_b.phi), high = std::fmax(at_a.phi, at_b.phi);
             // Every whole turn by which phi - wide .. phi + wide can meet low .. high.
@@ -235,32 +247,38 @@ MEDULLA_FN float place_panel(FarField<Channels>& far, float a, float b, GaussRul
     const Longitudinal<Channels>& m = far.near.longitudinal;
     const float middle = 0.5f * (a + b), half = 0.5f * (b - a);
     float most = 0;
-    for (int i = 0; i < 2 * rule.half && far.nodes < most_scattering_nodes; ++i) {
-        const int k = i >> 1;
-        const Offset at = offset_inside(far.rim, middle + half * (i & 1 ? rule.x[k] : -rule.x[k]));
-        const Path<float> path = trace(m.at, parameters.kappa, parameters.layers, at.h, at.cos_i);
-        const Energies<Channels> e = energies(path, m.absorption, true);
-        ScatteringNode<Channels>& n = far.node[far.nodes++];
-        const float weight = rule.w[k] * half * at.dh * far.inverse_width;
-        const float offset = std::abs(path.h_inside) / parameters.kappa;
-        n.offset = offset < 1 ? offset : 1.0f;
-        n.side = at.h < 0 ? -1.0f : 1.0f;
-        float sum = 0;
+    for (int j = 0; 2 * j < rule.half && far.nodes + 4 <= most_scattering_nodes; ++j) {
+        const Offset<Four> at = offset_inside(far.rim, rule_nodes(rule, j, middle, half));
+        const Path<Four> path = trace(m.at, parameters.kappa, parameters.layers, at.h, at.cos_i);
+        const Energies<Channels, Four> e = energies(path, m.absorption, true);
+        const Four weight = rule_weights(rule, j) * Four(half * far.inverse_width) * at.dh;
+        const Four offset = magnitude(path.h_inside) * Four(1 / parameters.kappa);
+        Four sum, share[2], centre[2];
         for (int lobe = 0; lobe < lobe_count; ++lobe)
-            for (int c = 0; c < Channels; ++c) sum += e.A[lobe][c];
+            for (int c = 0; c < Channels; ++c) sum = sum + e.A[lobe][c];
+        const Four inverse = weight / choose(sum > Four(1e-30f), sum, Four(1.0f));
         for (int p = 0; p < 2; ++p) {
-            n.share[p] = 0;
-            for (int c = 0; c < Channels; ++c) n.share[p] += weight * e.A[p + 3][c];
-            n.share[p] = sum > 1e-30f ? n.share[p] / sum : 0.0f;
-            n.centre[p] = scattered_centre(p + 1, path.gamma_i, path.gamma_t) + float(pi);
-            for (int c = 0; c < Channels; ++c) n.A[p][c] = weight * e.A[p + 3][c], most = std::fmax(most, n.A[p][c]);
+            for (int c = 0; c < Channels; ++c) share[p] = share[p] + e.A[p + 3][c] * inverse;
+            centre[p] = scattered_centre(p + 1, path.gamma_i, path.gamma_t) + Four(float(pi));
+        }
+        for (int i = 0; i < 4; ++i) {
+            ScatteringNode<Channels>& n = far.node[far.nodes++];
+            n.offset = std::fmin(lane(offset, i), 1.0f);
+            n.side = lane(at.h, i) < 0 ? -1.0f : 1.0f;
+            for (int p = 0; p < 2; ++p) {
+                n.share[p] = lane(share[p], i), n.centre[p] = lane(centre[p], i);
+                for (int c = 0; c < Channels; ++c) {
+                    n.A[p][c] = lane(weight, i) * lane(e.A[p + 3][c], i);
+                    most = std::fmax(most, n.A[p][c]);
+                }
+            }
         }
     }
     return most;
 }
 
-/// Nodes of the scattered lobes: 16 over psi for an ordinary medulla, more where g makes the lobe narrow against its
-/// shift; in a dense medulla TRTs lives within 1 / tau of the rim in psi, which then has panels of its own.
+/// Nodes of the scattered lobes: 12 or 16 over psi for an ordinary medulla, more where g makes the lobe narrow against
+/// its shift; in a dense medulla TRTs lives within 1 / tau of the rim in psi, which then has panels of its own.
 template <int Channels>
 MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
     const FurParameters<Channels>& parameters = far.fibre().parameters;
@@ -269,7 +287,8 @@ MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
     if (!(b > a)) return;
     const float width = 1 - std::abs(parameters.g);  // of planar HG's peak [radians]
     const float per_panel = width > 0.2f ? 3.2f : (width > 0.1f ? 1.6f : 0.8f);
-    const GaussRule rule = gauss_rule(2 + (far.quality < 0 ? -1 : 0)), edge = gauss_rule(1);
+    const int index = (width > 0.4f ? 1 : 2) + far.quality;
+    const GaussRule rule = gauss_rule(index < 0 ? 0 : (index > 2 ? 2 : index)), edge = gauss_rule(1);
     const float tau = far.near.longitudinal.absorption.medulla_extinction * parameters.kappa;
     float most = 0, low = a, high = b;
     if (tau > 4) {
@@ -328,18 +347,22 @@ MEDULLA_FN void far_field(const FurFibre<Channels>& fibre, float theta_i, Offset
 /// N of one unscattered lobe, p = 0, 1, 2, averaged over the range.
 template <int Channels>
 MEDULLA_FN void average_unscattered(const FarField<Channels>& far, int p, float phi, float (&N)[Channels]) noexcept {
-    for (int c = 0; c < Channels; ++c) N[c] = 0;
+    Four sum[Channels];
     const Absorption<Channels>& a = far.near.longitudinal.absorption;
-    detail::visit_unscattered(far, p, phi, [&](const Path<float>& path, float weight, float D) {
-        const float F = path.cuticle.F, T = path.cuticle.T_;
+    const float passes = 2 * float(p);
+    detail::visit_unscattered(far, p, phi, [&](const Path<Four>& path, Four weight, Four D) {
+        const Four F = path.cuticle.F, T = path.cuticle.T_, value = weight * D;
         if (p == 0) {
-            for (int c = 0; c < Channels; ++c) N[c] += weight * D * F;
+            sum[0] = sum[0] + value * F;
             return;
         }
-        const float amplitude = weight * D * T * T * (p == 2 ? F : 1.0f), n = 2 * float(p);
+        const Four amplitude = value * T * T * (p == 2 ? F : Four(1.0f)),
+                   medulla = path.s_m * Four(a.medulla_extinction);
         for (int c = 0; c < Channels; ++c)
-            N[c] += amplitude * real_math::exponential(-n * (path.s_c * a.cortex[c] + path.s_m * a.medulla_extinction));
+            sum[c] =
+                sum[c] + amplitude * real_math::exponential(-Four(passes) * (path.s_c * Four(a.cortex[c]) + medulla));
     });
+    for (int c = 0; c < Channels; ++c) N[c] = sum_of(sum[p == 0 ? 0 : c]);
 }
 
 /// N of TTs and TRTs averaged over the range: the lobe's shift and its offset change together with h, so each node

@@ -52,10 +52,23 @@ MEDULLA_FN void prepare_table(const TableView& view, float g, MaterialTable& tab
 }
 
 /// The lobe that is left at (sigma, h or theta_i).
-MEDULLA_FN void contract(const MaterialTable& table, float sigma, float last, Contraction& result) noexcept {
+MEDULLA_FN void contract(const MaterialTable& table, const AxisPoint& sigma, const AxisPoint& last,
+                         Contraction& result) noexcept {
     contract_axis(table.view, table.sigma_axis, sigma, table.weight, result.weight);
     contract_axis(table.view, table.last_axis, last, result.weight, result.weight);
     result.inverse_integral = inverse_integral(table.view, result.weight);
+}
+MEDULLA_FN void contract(const MaterialTable& table, float sigma, float last, Contraction& result) noexcept {
+    contract(table, axis_point(table.view, table.sigma_axis, sigma), axis_point(table.view, table.last_axis, last),
+             result);
+}
+
+/// Whether axis `i` of one table has the breakpoints of axis `k` of another: what is located once then serves both.
+MEDULLA_FN bool same_axis(const TableView& a, std::uint32_t i, const TableView& b, std::uint32_t k) noexcept {
+    const PackAxis &x = a.layout.axes[i], &y = b.layout.axes[k];
+    if (x.quantity != y.quantity || x.spans != y.spans) return false;
+    const std::size_t bytes = (x.spans + 1 + 2 * ghost_knots) * sizeof(Knot<float>);
+    return std::memcmp(a.bytes + x.knots_offset, b.bytes + y.knots_offset, bytes) == 0;
 }
 
 /// A material, ready to be asked. It borrows the pack's bytes, allocates nothing and is constant once prepared.
@@ -67,6 +80,7 @@ struct FurFibre {
     float shift[3] = {}, deviation[3] = {};             ///< alpha_p, beta_p of Table 2 [radians]
     WrappedGaussian<float> azimuthal_gaussian[3] = {};  ///< variance (p + 1) beta_n^2 (Eq. 16)
     MaterialTable azimuthal, back, forward;
+    bool paired = false;  ///< whether `back` and `forward` have the same axes
 };
 
 /// Prepares `fibre`. kappa = 0 or sigma_ms = 0 never reads a table and is exactly the hair model R + TT + TRT.
@@ -92,6 +106,9 @@ MEDULLA_FN FurStatus prepare(const FurParameters<Channels>& p, const PackView& p
     prepare_table(azimuthal, p.g, fibre.azimuthal);
     prepare_table(back, p.g, fibre.back);
     prepare_table(forward, p.g, fibre.forward);
+    fibre.paired = true;
+    for (std::uint32_t k = 0; k < back.layout.axis_count; ++k)
+        fibre.paired = fibre.paired && same_axis(back, k, forward, k);
     fibre.scattered = true;
     return fibre.status;
 }
@@ -148,8 +165,15 @@ MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, 
     m.sigma = fibre.parameters.sigma_ms * fibre.parameters.kappa * m.at.inverse_cos_t;
     if (!fibre.scattered) return;
     const float inclined = theta_i < 0 ? -theta_i : theta_i;
-    contract(fibre.back, m.sigma, inclined, m.back);
-    contract(fibre.forward, m.sigma, inclined, m.forward);
+    if (!fibre.paired) {
+        contract(fibre.back, m.sigma, inclined, m.back);
+        contract(fibre.forward, m.sigma, inclined, m.forward);
+        return;
+    }
+    const AxisPoint at_sigma = axis_point(fibre.back.view, fibre.back.sigma_axis, m.sigma);
+    const AxisPoint at_theta = axis_point(fibre.back.view, fibre.back.last_axis, inclined);
+    contract(fibre.back, at_sigma, at_theta, m.back);
+    contract(fibre.forward, at_sigma, at_theta, m.forward);
 }
 
 /// M of the three unscattered lobes and, where `scattered`, M^s (Eq. 19): lerp over |phi| / pi of C^M back and forward.
@@ -160,8 +184,12 @@ MEDULLA_FN void longitudinal_lobes(const FurFibre<Channels>& fibre, const Longit
     if (!scattered) return;
     const float side = m.theta_i < 0 ? -theta_r : theta_r;
     const float t = std::abs(wrap_angle(phi)) * float(1 / pi);
-    const float back = lobe(fibre.back.view, m.back, side), forward = lobe(fibre.forward.view, m.forward, side);
-    lobes.M[3] = lobes.M[4] = (1 - t) * back + t * forward;
+    const TableView &back_view = fibre.back.view, &forward_view = fibre.forward.view;
+    const AxisPoint at_back = axis_point(back_view, back_view.parameter_axes(), side);
+    const AxisPoint at_forward = fibre.paired ? at_back : axis_point(forward_view, forward_view.parameter_axes(), side);
+    const float back = signed_lobe(back_view, m.back, at_back);
+    const float forward = signed_lobe(forward_view, m.forward, at_forward);
+    lobes.M[3] = lobes.M[4] = (1 - t) * (back < 0 ? 0.0f : back) + t * (forward < 0 ? 0.0f : forward);
 }
 
 /// The fibre lit from theta_i at offset h: what is left is a function of the exit (theta_r, phi).

@@ -1,4 +1,4 @@
-// Gauss-Legendre rules on [-1, 1] of 6, 10, 16 and 24 nodes, stored by halves: nodes are +-x.
+// Gauss-Legendre rules on [-1, 1] of 8, 12, 16 and 24 nodes, stored by halves: nodes are +-x.
 // Rests on Newton's iteration on the Legendre recurrence, rounded to 10 digits; tests integrate polynomials with them.
 #pragma once
 
@@ -15,12 +15,14 @@ struct GaussRule {
     const float* w;
 };
 
-/// Rule 0 .. 3: 6, 10, 16, 24 nodes.
+/// Rule 0 .. 3: 8, 12, 16, 24 nodes, multiples of four.
 MEDULLA_FN GaussRule gauss_rule(int index) noexcept {
-    static constexpr float x6[] = {0.2386191861f, 0.6612093865f, 0.9324695142f};
-    static constexpr float w6[] = {0.4679139346f, 0.360761573f, 0.1713244924f};
-    static constexpr float x10[] = {0.148874339f, 0.4333953941f, 0.6794095683f, 0.8650633667f, 0.9739065285f};
-    static constexpr float w10[] = {0.2955242247f, 0.2692667193f, 0.2190863625f, 0.1494513492f, 0.06667134431f};
+    static constexpr float x8[] = {0.1834346425f, 0.5255324099f, 0.7966664774f, 0.9602898565f};
+    static constexpr float w8[] = {0.3626837834f, 0.3137066459f, 0.2223810345f, 0.1012285363f};
+    static constexpr float x12[] = {0.1252334085f, 0.367831499f,  0.5873179543f,
+                                    0.7699026742f, 0.9041172564f, 0.9815606342f};
+    static constexpr float w12[] = {0.2491470458f, 0.2334925365f, 0.2031674267f,
+                                    0.1600783285f, 0.106939326f,  0.04717533639f};
     static constexpr float x16[] = {0.09501250984f, 0.2816035508f, 0.4580167777f, 0.6178762444f,
                                     0.7554044084f,  0.8656312024f, 0.9445750231f, 0.989400935f};
     static constexpr float w16[] = {0.1894506105f, 0.182603415f,   0.1691565194f,  0.1495959888f,
@@ -33,9 +35,9 @@ MEDULLA_FN GaussRule gauss_rule(int index) noexcept {
                                     0.05929858492f, 0.04427743882f, 0.02853138863f, 0.0123412298f};
     switch (index) {
         case 0:
-            return {3, x6, w6};
+            return {4, x8, w8};
         case 1:
-            return {5, x10, w10};
+            return {6, x12, w12};
         case 2:
             return {8, x16, w16};
         default:

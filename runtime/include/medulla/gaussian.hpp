@@ -45,12 +45,24 @@ MEDULLA_FN T scaled_tail_mass(T near, T w) noexcept {
     return T(0.5) * (scaled_erfc(near * root_half) - (tail > T(0) ? tail * scaled_erfc(far * root_half) : T(0)));
 }
 
+/// Mass of the standard normal between 0 and z >= 0.
+template <class T>
+MEDULLA_FN T normal_half_mass(T z) noexcept {
+    using std::erf;
+    return T(0.5) * erf(z * T(0.70710678118654752));
+}
+/// Abramowitz and Stegun 7.1.26: absolute error 1e-7, and the masses it is used for are not small.
+MEDULLA_FN float normal_half_mass(float z) noexcept {
+    const float x = z * 0.70710678f, t = 1 / (1 + 0.3275911f * x);
+    const float p =
+        t * (0.254829592f + t * (-0.284496736f + t * (1.421413741f + t * (-1.453152027f + t * 1.061405429f))));
+    return 0.5f - 0.5f * p * real_math::exponential(-x * x);
+}
+
 /// Mass of the standard normal over [a, b], a <= 0 <= b.
 template <class T>
 MEDULLA_FN T normal_mass(T a, T b) noexcept {
-    constexpr T root_half = T(0.70710678118654752);
-    using std::erf;
-    return T(0.5) * (erf(b * root_half) - erf(a * root_half));
+    return normal_half_mass(b) + normal_half_mass(-a);
 }
 
 }  // namespace detail
@@ -98,6 +110,8 @@ MEDULLA_FN T sample(const TruncatedGaussian<T>& gaussian, T u) noexcept {
     const T v = mirrored ? T(1) - u : u;
     // 7.5 deviations from the centre hold all but 3e-14.
     T low = inside && a < T(-7.5) ? T(-7.5) : a, high = inside && b > T(7.5) ? T(7.5) : b;
+    constexpr T root_half = T(0.70710678118654752);
+    const T half_below = T(0.5) * std::erf(-a * root_half);  // mass between the lower edge and the centre
     const T left = T(1) - v;
     T d = inside ? T(0) : -std::log(left > T(1e-30) ? left : T(1e-30)) / (gaussian.beyond + T(1));
     for (int i = 0; i < 60; ++i) {
@@ -106,11 +120,9 @@ MEDULLA_FN T sample(const TruncatedGaussian<T>& gaussian, T u) noexcept {
         if (!inside) {
             share = to_share * detail::scaled_tail_mass(gaussian.beyond, d);
         } else if (d >= T(0)) {
-            share = to_share * detail::normal_mass(a, d);
+            share = to_share * (T(0.5) * std::erf(d * root_half) + half_below);
         } else {
-            share = T(1) - to_share * detail::normal_mass(d, b);
-            // Far from the other edge the left tail is known better by itself.
-            if (a < T(-5)) share = to_share * T(0.5) * std::erfc(-d * T(0.70710678118654752));
+            share = to_share * (half_below - T(0.5) * std::erf(-d * root_half));
         }
         const T error = share - v;
         (error > T(0) ? high : low) = d;
@@ -148,27 +160,38 @@ struct WrappedGaussian {
         if (deviation <= T(1.2)) return images(x);
         return harmonics(x);
     }
+    /// Density at several angles abreast.
+    template <class V>
+    MEDULLA_FN V pdf_of(V delta) const noexcept {
+        const V x = delta - V(T(2 * pi)) * nearest_integer(delta * V(T(1 / (2 * pi))));
+        return deviation <= T(1.2) ? images(x) : harmonics(x);
+    }
     /// Sum of images: at deviation 1.2 the first one left out is 7.8 deviations away (1e-13).
-    MEDULLA_FN T images(T x) const noexcept {
-        const T z = x * inverse;
-        T sum = real_math::exponential(T(-0.5) * z * z);
+    template <class V>
+    MEDULLA_FN V images(V x) const noexcept {
+        const V z = x * V(inverse);
+        V sum = real_math::exponential(V(T(-0.5)) * z * z);
         if (deviation > T(0.25)) {  // else the next image is at least 12 deviations away
-            const T turn = T(2 * pi) * inverse, p = z + turn, q = z - turn;
-            sum += real_math::exponential(T(-0.5) * p * p) + real_math::exponential(T(-0.5) * q * q);
+            const V turn = V(T(2 * pi) * inverse), p = z + turn, q = z - turn;
+            sum = sum + real_math::exponential(V(T(-0.5)) * p * p) + real_math::exponential(V(T(-0.5)) * q * q);
         }
-        return peak * sum;
+        return V(peak) * sum;
     }
     /// Theta series: sum of damping^(n^2) cos(n x); at deviation 1.2 the sixth term is 6e-12.
-    MEDULLA_FN T harmonics(T x) const noexcept {
-        const T c = std::cos(x), d2 = damping * damping;
-        T before = T(1), now = c, power = damping, ratio = damping * d2, sum = T(0);
+    template <class V>
+    MEDULLA_FN V harmonics(V x) const noexcept {
+        const auto half = real_math::sine_cosine(V(T(0.5)) * x);  // |x / 2| <= pi / 2
+        const V c = half.cosine * half.cosine - half.sine * half.sine;
+        const T d2 = damping * damping;
+        V before = V(T(1)), now = c, sum = V(T(0));
+        T power = damping, ratio = damping * d2;
         for (int n = 1; n <= 5; ++n) {
-            sum += power * now;
-            const T next = T(2) * c * now - before;
+            sum = sum + V(power) * now;
+            const V next = V(T(2)) * c * now - before;
             before = now, now = next;
             power *= ratio, ratio *= d2;
         }
-        return (T(1) + T(2) * sum) * T(1 / (2 * pi));
+        return (V(T(1)) + V(T(2)) * sum) * V(T(1 / (2 * pi)));
     }
 };
 

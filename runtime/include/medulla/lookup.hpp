@@ -5,11 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "medulla/lanes.hpp"
 #include "medulla/pack.hpp"
-
-#if defined(__SSE2__)
-#include <emmintrin.h>
-#endif
 
 namespace medulla {
 
@@ -45,27 +42,47 @@ struct Contraction {
 
 namespace detail {
 
-/// Eight components side by side: SSE2, which every x86-64 has, or plain floats.
-#if defined(__SSE2__) && !defined(__CUDA_ARCH__) && !defined(__HIP_DEVICE_COMPILE__)
+/// Eight components side by side: AVX2 where the renderer is built for it, SSE2, which every x86-64 has, or plain
+/// floats.
+#if defined(MEDULLA_SSE2) && defined(__AVX2__)
+struct Eight {
+    __m256 v;
+};
+MEDULLA_HOT Eight zero_eight() noexcept { return {_mm256_setzero_ps()}; }
+MEDULLA_HOT Eight load_eight(const float* x) noexcept { return {_mm256_loadu_ps(x)}; }
+MEDULLA_HOT void store_eight(Eight a, float* x) noexcept { _mm256_storeu_ps(x, a.v); }
+MEDULLA_HOT Eight convert_eight(const unsigned char* row) noexcept {
+    const __m128i q = _mm_loadu_si128(reinterpret_cast<const __m128i*>(row));
+    return {_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(q))};
+}
+MEDULLA_HOT Eight times(Eight a, Eight b) noexcept { return {_mm256_mul_ps(a.v, b.v)}; }
+MEDULLA_HOT Eight times(float a, Eight b) noexcept { return {_mm256_mul_ps(_mm256_set1_ps(a), b.v)}; }
+MEDULLA_HOT Eight plus(Eight a, Eight b) noexcept { return {_mm256_add_ps(a.v, b.v)}; }
+MEDULLA_HOT float sum_of(Eight a) noexcept {
+    const __m128 x = _mm_add_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
+    const __m128 y = _mm_add_ps(x, _mm_movehl_ps(x, x));
+    return _mm_cvtss_f32(_mm_add_ss(y, _mm_shuffle_ps(y, y, 1)));
+}
+#elif defined(MEDULLA_SSE2)
 struct Eight {
     __m128 low, high;
 };
-MEDULLA_FN Eight zero_eight() noexcept { return {_mm_setzero_ps(), _mm_setzero_ps()}; }
-MEDULLA_FN Eight load_eight(const float* x) noexcept { return {_mm_loadu_ps(x), _mm_loadu_ps(x + 4)}; }
-MEDULLA_FN void store_eight(Eight a, float* x) noexcept { _mm_storeu_ps(x, a.low), _mm_storeu_ps(x + 4, a.high); }
-MEDULLA_FN Eight convert_eight(const unsigned char* row) noexcept {
+MEDULLA_HOT Eight zero_eight() noexcept { return {_mm_setzero_ps(), _mm_setzero_ps()}; }
+MEDULLA_HOT Eight load_eight(const float* x) noexcept { return {_mm_loadu_ps(x), _mm_loadu_ps(x + 4)}; }
+MEDULLA_HOT void store_eight(Eight a, float* x) noexcept { _mm_storeu_ps(x, a.low), _mm_storeu_ps(x + 4, a.high); }
+MEDULLA_HOT Eight convert_eight(const unsigned char* row) noexcept {
     // A word moved to the upper half and shifted down keeps its sign.
     const __m128i q = _mm_loadu_si128(reinterpret_cast<const __m128i*>(row));
     return {_mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(q, q), 16)),
             _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(q, q), 16))};
 }
-MEDULLA_FN Eight times(Eight a, Eight b) noexcept { return {_mm_mul_ps(a.low, b.low), _mm_mul_ps(a.high, b.high)}; }
-MEDULLA_FN Eight times(float a, Eight b) noexcept {
+MEDULLA_HOT Eight times(Eight a, Eight b) noexcept { return {_mm_mul_ps(a.low, b.low), _mm_mul_ps(a.high, b.high)}; }
+MEDULLA_HOT Eight times(float a, Eight b) noexcept {
     const __m128 w = _mm_set1_ps(a);
     return {_mm_mul_ps(w, b.low), _mm_mul_ps(w, b.high)};
 }
-MEDULLA_FN Eight plus(Eight a, Eight b) noexcept { return {_mm_add_ps(a.low, b.low), _mm_add_ps(a.high, b.high)}; }
-MEDULLA_FN float sum_of(Eight a) noexcept {
+MEDULLA_HOT Eight plus(Eight a, Eight b) noexcept { return {_mm_add_ps(a.low, b.low), _mm_add_ps(a.high, b.high)}; }
+MEDULLA_HOT float sum_of(Eight a) noexcept {
     const __m128 x = _mm_add_ps(a.low, a.high), y = _mm_add_ps(x, _mm_movehl_ps(x, x));
     return _mm_cvtss_f32(_mm_add_ss(y, _mm_shuffle_ps(y, y, 1)));
 }
@@ -73,46 +90,46 @@ MEDULLA_FN float sum_of(Eight a) noexcept {
 struct Eight {
     float x[rank_multiple];
 };
-MEDULLA_FN Eight zero_eight() noexcept { return {}; }
-MEDULLA_FN Eight load_eight(const float* x) noexcept {
+MEDULLA_HOT Eight zero_eight() noexcept { return {}; }
+MEDULLA_HOT Eight load_eight(const float* x) noexcept {
     Eight a;
     std::memcpy(a.x, x, sizeof a.x);
     return a;
 }
-MEDULLA_FN void store_eight(const Eight& a, float* x) noexcept { std::memcpy(x, a.x, sizeof a.x); }
-MEDULLA_FN Eight convert_eight(const unsigned char* row) noexcept {
+MEDULLA_HOT void store_eight(const Eight& a, float* x) noexcept { std::memcpy(x, a.x, sizeof a.x); }
+MEDULLA_HOT Eight convert_eight(const unsigned char* row) noexcept {
     std::int16_t q[rank_multiple];
     std::memcpy(q, row, sizeof q);
     Eight a;
     for (std::uint32_t r = 0; r < rank_multiple; ++r) a.x[r] = float(q[r]);
     return a;
 }
-MEDULLA_FN Eight times(const Eight& a, Eight b) noexcept {
+MEDULLA_HOT Eight times(const Eight& a, Eight b) noexcept {
     for (std::uint32_t r = 0; r < rank_multiple; ++r) b.x[r] *= a.x[r];
     return b;
 }
-MEDULLA_FN Eight times(float a, Eight b) noexcept {
+MEDULLA_HOT Eight times(float a, Eight b) noexcept {
     for (std::uint32_t r = 0; r < rank_multiple; ++r) b.x[r] *= a;
     return b;
 }
-MEDULLA_FN Eight plus(const Eight& a, Eight b) noexcept {
+MEDULLA_HOT Eight plus(const Eight& a, Eight b) noexcept {
     for (std::uint32_t r = 0; r < rank_multiple; ++r) b.x[r] += a.x[r];
     return b;
 }
-MEDULLA_FN float sum_of(const Eight& a) noexcept {
+MEDULLA_HOT float sum_of(const Eight& a) noexcept {
     const float* x = a.x;
     return ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]));
 }
 #endif
 
 /// sum over four rows of w[t] * row_t, for eight components; rows are `step` bytes apart.
-MEDULLA_FN Eight blend(const unsigned char* row, std::size_t step, const SplineWeights<float>& w) noexcept {
+MEDULLA_HOT Eight blend(const unsigned char* row, std::size_t step, const SplineWeights<float>& w) noexcept {
     const Eight a = times(w.w[0], convert_eight(row)), b = times(w.w[1], convert_eight(row + step));
     const Eight c = times(w.w[2], convert_eight(row + 2 * step)), d = times(w.w[3], convert_eight(row + 3 * step));
     return plus(plus(a, b), plus(c, d));
 }
 
-MEDULLA_FN Eight load_eight(const TableView& table, std::uint32_t offset, std::uint32_t first) noexcept {
+MEDULLA_HOT Eight load_eight(const TableView& table, std::uint32_t offset, std::uint32_t first) noexcept {
     float x[rank_multiple];
     std::memcpy(x, table.bytes + offset + 4 * first, sizeof x);
     return load_eight(x);
@@ -134,18 +151,31 @@ MEDULLA_FN void start_contraction(const TableView& table, float* weight) noexcep
     std::memcpy(weight, table.bytes + table.layout.scales_offset, 4 * std::size_t(table.layout.rank_stride));
 }
 
-/// to[r] = from[r] * (factor r of axis k at x), x a value of the axis's quantity; values outside are held to its ends.
-MEDULLA_FN void contract_axis(const TableView& table, std::uint32_t k, float x, const float* from, float* to) noexcept {
+/// Where a value lies on an axis of a table: four rows from `span` and their weights.
+struct AxisPoint {
+    std::uint32_t span;
+    SplineWeights<float> weights;
+};
+
+/// @param x a value of the axis's quantity; outside the axis it is held to its ends
+MEDULLA_HOT AxisPoint axis_point(const TableView& table, std::uint32_t k, float x) noexcept {
     const AxisView<float> axis = table.axis(k);
-    const auto quantity = static_cast<Quantity>(table.layout.axes[k].quantity);
-    const Cell<float> cell = locate(axis, spline_coordinate(quantity, x));
-    const SplineWeights<float> weights = spline_weights(axis, cell);
-    const unsigned char* row = table.row(k, cell.span);
+    const Cell<float> cell = locate(axis, spline_coordinate(static_cast<Quantity>(table.layout.axes[k].quantity), x));
+    return {cell.span, spline_weights(axis, cell)};
+}
+
+/// to[r] = from[r] * (factor r of axis k at the point).
+MEDULLA_HOT void contract_axis(const TableView& table, std::uint32_t k, const AxisPoint& at, const float* from,
+                               float* to) noexcept {
+    const unsigned char* row = table.row(k, at.span);
     const std::uint32_t stride = table.layout.rank_stride;
     for (std::uint32_t first = 0; first < stride; first += rank_multiple) {
-        const detail::Eight factor = detail::blend(row + 2 * first, 2 * std::size_t(stride), weights);
+        const detail::Eight factor = detail::blend(row + 2 * first, 2 * std::size_t(stride), at.weights);
         detail::store_eight(detail::times(detail::load_eight(from + first), factor), to + first);
     }
+}
+MEDULLA_FN void contract_axis(const TableView& table, std::uint32_t k, float x, const float* from, float* to) noexcept {
+    contract_axis(table, k, axis_point(table, k, x), from, to);
 }
 
 /// 1 / integral over the exit direction of the contracted lobe. A signed low-rank sum with no positive integral is no
@@ -171,19 +201,19 @@ MEDULLA_FN Contraction contract(const TableView& table, const LobeQuery& query) 
     return result;
 }
 
-/// Density per radian at exit direction y [radians] of a table with an exit axis, before anything is held to >= 0.
-MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contraction, float y) noexcept {
-    const std::uint32_t exit = table.parameter_axes();
-    const AxisView<float> axis = table.axis(exit);
-    const Cell<float> cell = locate(axis, y);
-    const SplineWeights<float> weights = spline_weights(axis, cell);
-    const unsigned char* row = table.row(exit, cell.span);
+/// Density per radian at a point of the exit axis, before anything is held to >= 0.
+MEDULLA_HOT float signed_lobe(const TableView& table, const Contraction& contraction, const AxisPoint& at) noexcept {
+    const unsigned char* row = table.row(table.parameter_axes(), at.span);
     const std::uint32_t stride = table.layout.rank_stride;
     detail::Eight sum = detail::zero_eight();
     for (std::uint32_t first = 0; first < stride; first += rank_multiple)
         sum = detail::plus(sum, detail::times(detail::load_eight(contraction.weight + first),
-                                              detail::blend(row + 2 * first, 2 * std::size_t(stride), weights)));
+                                              detail::blend(row + 2 * first, 2 * std::size_t(stride), at.weights)));
     return detail::sum_of(sum) * contraction.inverse_integral;
+}
+/// The same at exit direction y [radians] of a table with an exit axis.
+MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contraction, float y) noexcept {
+    return signed_lobe(table, contraction, axis_point(table, table.parameter_axes(), y));
 }
 
 /// Density per radian, >= 0, with integral 1: a signed low-rank sum dips below 0 where the lobe is nearly 0, and

@@ -1,15 +1,75 @@
-// Elementary functions the lobes spend their time in: the standard library's for any scalar, and for float
-// branch-free polynomials (2 ulp class) that a compiler can run side by side for several nodes.
+// Elementary functions the lobes spend their time in: the standard library's for any scalar, and for float, alone or
+// four abreast, branch-free polynomials (relative error < 4e-7).
 #pragma once
 
 #include <cmath>
-#include <cstdint>
-#include <cstring>
 
 #include "medulla/config.hpp"
+#include "medulla/lanes.hpp"
 
 namespace medulla {
 namespace real_math {
+
+template <class T>
+struct SineCosine {
+    T sine, cosine;
+};
+
+namespace polynomial {
+
+/// exp(x), x <= 80; below -87 exactly 0, so that a lobe out of reach is no denormal.
+/// x = n log 2 + r, |r| <= log(2) / 2; degree 6 in r.
+template <class T>
+MEDULLA_FN T exponential(T x) noexcept {
+    const auto out = x < T(-87.0f);
+    const T y = choose(out, T(-87.0f), x), k = nearest_integer(y * T(1.44269504f));
+    const T r = (y - k * T(0.693359375f)) + k * T(2.12194440e-4f);
+    const T p =
+        T(1.0f) +
+        r * (T(1.0f) + r * (T(0.5f) + r * (T(1.6666667e-1f) +
+                                           r * (T(4.1666646e-2f) + r * (T(8.3335698e-3f) + r * T(1.3943e-3f))))));
+    return choose(out, T(0.0f), p * power_of_two(k));
+}
+
+/// 1 - exp(-x), x >= 0: Taylor to x^6 below 0.25, where the next term is 5e-8 of the first.
+template <class T>
+MEDULLA_FN T absorbed(T x) noexcept {
+    const T z = choose(x < T(0.25f), x, T(0.0f));
+    const T small =
+        z * (T(1.0f) - z * (T(0.5f) - z * (T(1.6666667e-1f) -
+                                           z * (T(4.1666667e-2f) - z * (T(8.3333333e-3f) - z * T(1.3888889e-3f))))));
+    return choose(x < T(0.25f), small, T(1.0f) - exponential(-x));
+}
+
+/// Angle in [-pi/2, pi/2] of the point (cosine >= 0, sine) on the unit circle: asin of the smaller of the two, by
+/// Cephes' asinf up to 1/2 and its half-angle form up to sqrt(1/2), so that no digits are lost at either end.
+template <class T>
+MEDULLA_FN T angle(T sine, T cosine) noexcept {
+    const T s = magnitude(sine);
+    const auto steep = s > cosine;
+    const T x = choose(steep, cosine, s);
+    const auto far = x > T(0.5f);
+    const T w = T(0.5f) * (T(1.0f) - x), z = choose(far, w, x * x);
+    const T p =
+        T(1.0f) + z * (T(1.6666752e-1f) +
+                       z * (T(7.4953002e-2f) + z * (T(4.5470025e-2f) + z * (T(2.4181311e-2f) + z * T(4.2163199e-2f)))));
+    const T root = choose(far, square_root(w), x) * p;
+    const T a = choose(far, T(1.57079633f) - T(2.0f) * root, root);
+    return with_sign(choose(steep, T(1.57079633f) - a, a), sine);
+}
+
+/// Sine and cosine in [-pi/2, pi/2] from the half angle, |x/2| <= pi/4, by Cephes' polynomials; (c - s)(c + s) keeps
+/// the cosine's digits near pi/2.
+template <class T>
+MEDULLA_FN SineCosine<T> sine_cosine(T x) noexcept {
+    const T y = T(0.5f) * x, z = y * y;
+    const T s = y + y * z * (T(-1.6666654611e-1f) + z * (T(8.3321608736e-3f) + z * T(-1.9515295891e-4f)));
+    const T c = T(1.0f) - T(0.5f) * z +
+                z * z * (T(4.166664568298827e-2f) + z * (T(-1.388731625493765e-3f) + z * T(2.443315711809948e-5f)));
+    return {T(2.0f) * s * c, (c - s) * (c + s)};
+}
+
+}  // namespace polynomial
 
 /// exp(x).
 template <class T>
@@ -17,25 +77,8 @@ MEDULLA_FN T exponential(T x) noexcept {
     using std::exp;
     return exp(x);
 }
-
-/// exp(x) for float, x <= 80; below -87 exactly 0, so that a lobe out of reach is no denormal.
-/// x = n log 2 + r, |r| <= log(2)/2; degree 6 on r: relative error < 3e-7.
-MEDULLA_FN float exponential(float x) noexcept {
-    const bool out = x < -87.0f;
-    const float y = out ? -87.0f : x;
-    const float shifted = y * 1.44269504f + 12582912.0f;  // 1.5 * 2^23 rounds to the nearest integer
-    std::int32_t n;
-    std::memcpy(&n, &shifted, sizeof n);
-    const float k = float(n - 0x4b400000);
-    const float r = (y - k * 0.693359375f) + k * 2.12194440e-4f;
-    const float p =
-        1.0f +
-        r * (1.0f + r * (0.5f + r * (1.6666667e-1f + r * (4.1666646e-2f + r * (8.3335698e-3f + r * 1.3943e-3f)))));
-    const std::int32_t bits = ((n - 0x4b400000) + 127) << 23;
-    float scale;
-    std::memcpy(&scale, &bits, sizeof scale);
-    return out ? 0.0f : p * scale;
-}
+MEDULLA_FN float exponential(float x) noexcept { return polynomial::exponential(x); }
+MEDULLA_FN Four exponential(Four x) noexcept { return polynomial::exponential(x); }
 
 /// 1 - exp(-x) for x >= 0, to full relative precision.
 template <class T>
@@ -43,13 +86,8 @@ MEDULLA_FN T absorbed(T x) noexcept {
     using std::expm1;
     return -expm1(-x);
 }
-MEDULLA_FN float absorbed(float x) noexcept {
-    // Taylor to x^6 below 0.25: the next term is 0.25^6 / 5040 of the first, 5e-8.
-    const float small =
-        x * (1.0f - x * (0.5f - x * (1.6666667e-1f - x * (4.1666667e-2f - x * (8.3333333e-3f - x * 1.3888889e-3f)))));
-    const float large = 1.0f - exponential(-x);
-    return x < 0.25f ? small : large;
-}
+MEDULLA_FN float absorbed(float x) noexcept { return polynomial::absorbed(x); }
+MEDULLA_FN Four absorbed(Four x) noexcept { return polynomial::absorbed(x); }
 
 /// The angle in [-pi/2, pi/2] of the point (cosine >= 0, sine) on the unit circle.
 template <class T>
@@ -57,43 +95,18 @@ MEDULLA_FN T angle(T sine, T cosine) noexcept {
     using std::atan2;
     return atan2(sine, cosine);
 }
-/// asin of the smaller of sine and cosine, 2 ulp: no digits lost at either end since both are given.
-MEDULLA_FN float angle(float sine, float cosine) noexcept {
-    const float s = sine < 0 ? -sine : sine;
-    const bool steep = s > cosine;
-    const float x = steep ? cosine : s, z = x * x;  // x <= sqrt(1/2)
-    const float p = 1.0f + z * (1.6666752e-1f +
-                                z * (7.4953002e-2f + z * (4.5470025e-2f + z * (2.4181311e-2f + z * 4.2163199e-2f))));
-    // Cephes' asinf covers |x| <= 1/2; between 1/2 and sqrt(1/2) the half-angle form.
-    const bool far = x > 0.5f;
-    const float w = 0.5f * (1.0f - x), root = std::sqrt(w);
-    const float q = 1.0f + w * (1.6666752e-1f +
-                                w * (7.4953002e-2f + w * (4.5470025e-2f + w * (2.4181311e-2f + w * 4.2163199e-2f))));
-    const float a = far ? 1.57079633f - 2.0f * root * q : x * p;
-    const float b = steep ? 1.57079633f - a : a;
-    return sine < 0 ? -b : b;
-}
+MEDULLA_FN float angle(float sine, float cosine) noexcept { return polynomial::angle(sine, cosine); }
+MEDULLA_FN Four angle(Four sine, Four cosine) noexcept { return polynomial::angle(sine, cosine); }
 
 /// Sine and cosine of an angle in [-pi/2, pi/2].
-template <class T>
-struct SineCosine {
-    T sine, cosine;
-};
 template <class T>
 MEDULLA_FN SineCosine<T> sine_cosine(T x) noexcept {
     using std::cos;
     using std::sin;
     return {sin(x), cos(x)};
 }
-/// From the half angle, |x/2| <= pi/4: the polynomials of Cephes, then doubling; cos >= 0 keeps its digits as
-/// (c - s)(c + s) near pi/2.
-MEDULLA_FN SineCosine<float> sine_cosine(float x) noexcept {
-    const float y = 0.5f * x, z = y * y;
-    const float s = y + y * z * (-1.6666654611e-1f + z * (8.3321608736e-3f + z * -1.9515295891e-4f));
-    const float c =
-        1.0f - 0.5f * z + z * z * (4.166664568298827e-2f + z * (-1.388731625493765e-3f + z * 2.443315711809948e-5f));
-    return {2.0f * s * c, (c - s) * (c + s)};
-}
+MEDULLA_FN SineCosine<float> sine_cosine(float x) noexcept { return polynomial::sine_cosine(x); }
+MEDULLA_FN SineCosine<Four> sine_cosine(Four x) noexcept { return polynomial::sine_cosine(x); }
 
 }  // namespace real_math
 }  // namespace medulla

@@ -251,11 +251,16 @@ MEDULLA_FN float FarSampler<Channels>::pdf_angular(float theta_r, float phi) con
     for (int p = 0; p < 3; ++p) {
         const float M = far->near.longitudinal.gaussian[p].pdf(theta_r);
         if (!(M > 0)) continue;
-        float average = 0;
-        detail::visit_unscattered(*far, p, turned, [&](const Path<float>& path, float weight, float D) {
-            average += weight * D * shares_at(path).share[p];
+        Four average;
+        detail::visit_unscattered(*far, p, turned, [&](const Path<Four>& path, Four weight, Four D) {
+            const auto e = energies(path, far->near.longitudinal.absorption, far->nodes > 0);
+            Four all, own;
+            for (int lobe = 0; lobe < lobe_count; ++lobe)
+                for (int c = 0; c < Channels; ++c) all = all + e.A[lobe][c];
+            for (int c = 0; c < Channels; ++c) own = own + e.A[p][c];
+            average = average + weight * D * own / choose(all > Four(1e-30f), all, Four(1.0f));
         });
-        sum += M * average;
+        sum += M * sum_of(average);
     }
     if (far->nodes == 0) return sum;
     const float scattered =

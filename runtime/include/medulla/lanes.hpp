@@ -1,0 +1,153 @@
+// Four floats side by side with the operators of one, so that the same formula runs for one offset or for four.
+// Rests on SSE2, which every x86-64 has; elsewhere plain arrays that a compiler may or may not join.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#include "medulla/config.hpp"
+
+#if defined(__SSE2__) && !defined(__CUDA_ARCH__) && !defined(__HIP_DEVICE_COMPILE__)
+#define MEDULLA_SSE2 1
+#include <emmintrin.h>
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
+#endif
+
+namespace medulla {
+
+#if defined(MEDULLA_SSE2)
+struct Four {
+    __m128 v;
+    Four() noexcept : v(_mm_setzero_ps()) {}
+    Four(float x) noexcept : v(_mm_set1_ps(x)) {}  // implicit: a number is four of itself
+    explicit Four(__m128 x) noexcept : v(x) {}
+    Four(float a, float b, float c, float d) noexcept : v(_mm_setr_ps(a, b, c, d)) {}
+};
+inline Four operator+(Four a, Four b) noexcept { return Four(_mm_add_ps(a.v, b.v)); }
+inline Four operator-(Four a, Four b) noexcept { return Four(_mm_sub_ps(a.v, b.v)); }
+inline Four operator*(Four a, Four b) noexcept { return Four(_mm_mul_ps(a.v, b.v)); }
+inline Four operator/(Four a, Four b) noexcept { return Four(_mm_div_ps(a.v, b.v)); }
+inline Four operator-(Four a) noexcept { return Four(_mm_xor_ps(a.v, _mm_set1_ps(-0.0f))); }
+/// Comparisons give masks for `choose`.
+struct FourMask {
+    __m128 v;
+};
+inline FourMask operator<(Four a, Four b) noexcept { return {_mm_cmplt_ps(a.v, b.v)}; }
+inline FourMask operator>(Four a, Four b) noexcept { return {_mm_cmpgt_ps(a.v, b.v)}; }
+inline Four choose(FourMask mask, Four yes, Four no) noexcept {
+    return Four(_mm_or_ps(_mm_and_ps(mask.v, yes.v), _mm_andnot_ps(mask.v, no.v)));
+}
+inline Four square_root(Four a) noexcept { return Four(_mm_sqrt_ps(a.v)); }
+inline Four magnitude(Four a) noexcept { return Four(_mm_andnot_ps(_mm_set1_ps(-0.0f), a.v)); }
+/// |x| with the sign of y.
+inline Four with_sign(Four x, Four y) noexcept {
+    const __m128 sign = _mm_set1_ps(-0.0f);
+    return Four(_mm_or_ps(_mm_andnot_ps(sign, x.v), _mm_and_ps(sign, y.v)));
+}
+inline Four nearest_integer(Four a) noexcept { return Four(_mm_cvtepi32_ps(_mm_cvtps_epi32(a.v))); }
+/// 2^k for whole k, -126 <= k <= 127.
+inline Four power_of_two(Four k) noexcept {
+    const __m128i n = _mm_cvtps_epi32(k.v);
+    return Four(_mm_castsi128_ps(_mm_slli_epi32(_mm_add_epi32(n, _mm_set1_epi32(127)), 23)));
+}
+inline float lane(Four a, int i) noexcept {
+    alignas(16) float x[4];
+    _mm_store_ps(x, a.v);
+    return x[i];
+}
+inline float sum_of(Four a) noexcept {
+    const __m128 y = _mm_add_ps(a.v, _mm_movehl_ps(a.v, a.v));
+    return _mm_cvtss_f32(_mm_add_ss(y, _mm_shuffle_ps(y, y, 1)));
+}
+#else
+struct Four {
+    float v[4];
+    MEDULLA_FN Four() noexcept : v{0, 0, 0, 0} {}
+    MEDULLA_FN Four(float x) noexcept : v{x, x, x, x} {}  // implicit: a number is four of itself
+    MEDULLA_FN Four(float a, float b, float c, float d) noexcept : v{a, b, c, d} {}
+};
+template <class F>
+MEDULLA_FN Four each(F&& f) noexcept {
+    return Four(f(0), f(1), f(2), f(3));
+}
+MEDULLA_FN Four operator+(Four a, Four b) noexcept {
+    return each([&](int i) { return a.v[i] + b.v[i]; });
+}
+MEDULLA_FN Four operator-(Four a, Four b) noexcept {
+    return each([&](int i) { return a.v[i] - b.v[i]; });
+}
+MEDULLA_FN Four operator*(Four a, Four b) noexcept {
+    return each([&](int i) { return a.v[i] * b.v[i]; });
+}
+MEDULLA_FN Four operator/(Four a, Four b) noexcept {
+    return each([&](int i) { return a.v[i] / b.v[i]; });
+}
+MEDULLA_FN Four operator-(Four a) noexcept {
+    return each([&](int i) { return -a.v[i]; });
+}
+/// Comparisons give masks for `choose`.
+struct FourMask {
+    bool v[4];
+};
+MEDULLA_FN FourMask operator<(Four a, Four b) noexcept {
+    return {{a.v[0] < b.v[0], a.v[1] < b.v[1], a.v[2] < b.v[2], a.v[3] < b.v[3]}};
+}
+MEDULLA_FN FourMask operator>(Four a, Four b) noexcept { return b < a; }
+MEDULLA_FN Four choose(FourMask mask, Four yes, Four no) noexcept {
+    return each([&](int i) { return mask.v[i] ? yes.v[i] : no.v[i]; });
+}
+MEDULLA_FN Four square_root(Four a) noexcept {
+    return each([&](int i) { return std::sqrt(a.v[i]); });
+}
+MEDULLA_FN Four magnitude(Four a) noexcept {
+    return each([&](int i) { return a.v[i] < 0 ? -a.v[i] : a.v[i]; });
+}
+/// |x| with the sign of y.
+MEDULLA_FN Four with_sign(Four x, Four y) noexcept { return choose(y < Four(0.0f), -magnitude(x), magnitude(x)); }
+MEDULLA_FN Four nearest_integer(Four a) noexcept {
+    return each([&](int i) { return float(std::int32_t(a.v[i] + (a.v[i] < 0 ? -0.5f : 0.5f))); });
+}
+/// 2^k for whole k, -126 <= k <= 127.
+MEDULLA_FN Four power_of_two(Four k) noexcept {
+    return each([&](int i) { return std::ldexp(1.0f, int(k.v[i])); });
+}
+MEDULLA_FN float lane(Four a, int i) noexcept { return a.v[i]; }
+MEDULLA_FN float sum_of(Four a) noexcept { return (a.v[0] + a.v[2]) + (a.v[1] + a.v[3]); }
+#endif
+
+/// A constant as one number or as four.
+template <class T>
+struct Constant {
+    static MEDULLA_FN T of(double x) noexcept { return T(x); }
+};
+template <>
+struct Constant<Four> {
+    static MEDULLA_FN Four of(double x) noexcept { return Four(float(x)); }
+};
+
+// The same names for one number.
+template <class T>
+MEDULLA_FN T choose(bool condition, T yes, T no) noexcept {
+    return condition ? yes : no;
+}
+template <class T>
+MEDULLA_FN T square_root(T a) noexcept {
+    using std::sqrt;
+    return sqrt(a);
+}
+MEDULLA_FN float magnitude(float a) noexcept { return a < 0 ? -a : a; }
+MEDULLA_FN float with_sign(float x, float y) noexcept { return y < 0 ? -magnitude(x) : magnitude(x); }
+MEDULLA_FN float nearest_integer(float a) noexcept { return float(std::int32_t(a + (a < 0 ? -0.5f : 0.5f))); }
+MEDULLA_FN float power_of_two(float k) noexcept {
+    const std::int32_t bits = (std::int32_t(k) + 127) * 8388608;  // 2^23
+    float x;
+    std::memcpy(&x, &bits, sizeof x);
+    return x;
+}
+MEDULLA_FN float lane(float a, int) noexcept { return a; }
+MEDULLA_FN float sum_of(float a) noexcept { return a; }
+
+}  // namespace medulla

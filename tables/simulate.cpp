@@ -6,8 +6,10 @@
 #include <cstring>
 #include <exception>
 #include <functional>
+#include <optional>
 
 #include "sim2d/analog.hpp"
+#include "sim2d/disc_deterministic.hpp"
 #include "sim2d/slab_deterministic.hpp"
 #include "tables/error.hpp"
 
@@ -68,12 +70,21 @@ sim2d::TraceOptions trace_options(const Request& request, std::uint64_t cell) {
     return options;
 }
 
-bool noise_free(Method method) { return method == Method::automatic || method == Method::deterministic; }
-
 /// `auto` asks the random tracer where the noise-free solver's own estimate is worse than a thousandth.
 bool wants_paths(Method method, double error) {
     if (method == Method::deterministic) return false;
     return method != Method::automatic || error > 1e-3;
+}
+
+double worst_error(const sim2d::SlabProfile& p) { return std::max(p.back.standard_error, p.forward.standard_error); }
+
+/// What depends on g alone is worked out once and shared by every sigma; empty for the random methods.
+template <class Solver>
+std::vector<std::optional<Solver>> solvers_of(const Request& request) {
+    std::vector<std::optional<Solver>> solvers(request.g.size());
+    if (request.method == Method::automatic || request.method == Method::deterministic)
+        parallel(solvers.size(), request.threads, [&](std::size_t i) { solvers[i].emplace(request.g.values[i]); });
+    return solvers;
 }
 
 void begin(Table& table, const Request& request) {
@@ -88,17 +99,27 @@ Table simulate_azimuthal(const Request& request, ProgressMode mode) {
     table.name = "azimuthal";
     table.axes = {request.sigma, request.g, request.h, exit_axis("phi", request.bins)};
     begin(table, request);
+    const std::vector<double>& g = request.g.values;
     const std::size_t offsets = request.h.size(), slices = table.cells() / offsets;
     Progress progress(mode, "azimuthal", table.cells());
+    const auto solvers = solvers_of<sim2d::DiscSolver>(request);
     parallel(slices, request.threads, [&](std::size_t slice) {
-        const double sigma = request.sigma.values[slice / request.g.size()],
-                     g = request.g.values[slice % request.g.size()];
+        // The costly end first: great sigma.
+        slice = slices - 1 - slice;
+        const double sigma = request.sigma.values[slice / g.size()];
+        const std::size_t ig = slice % g.size();
+        std::vector<sim2d::Profile> solved(offsets);
+        if (solvers[ig]) solved = solvers[ig]->solve(sigma, request.h.values, request.bins);
         for (std::size_t i = 0; i < offsets; ++i) {
-            const double h = request.h.values[i];
-            store(table, slice * offsets + i,
-                  sim2d::trace_disc(sigma, g, h, request.bins, trace_options(request, cell_key(0, {sigma, g, h}))));
-            progress.add(1);
+            const double h = request.h.values[i], error = solvers[ig] ? solved[i].standard_error : 1;
+            if (wants_paths(request.method, error)) {
+                sim2d::Profile traced = sim2d::trace_disc(sigma, g[ig], h, request.bins,
+                                                          trace_options(request, cell_key(0, {sigma, g[ig], h})));
+                if (!solvers[ig] || traced.standard_error < error) solved[i] = std::move(traced);
+            }
+            store(table, slice * offsets + i, solved[i]);
         }
+        progress.add(offsets);
     });
     return table;
 }
@@ -111,31 +132,25 @@ Table simulate_longitudinal(const Request& request, ProgressMode mode) {
     const std::vector<double>& g = request.g.values;
     const std::size_t angles = request.theta_i.size(), slices = table.cells() / (2 * angles);
     Progress progress(mode, "longitudinal", table.cells());
-    // What depends on g alone is worked out once and shared by every sigma.
-    std::vector<std::optional<sim2d::SlabSolver>> solvers(g.size());
-    if (noise_free(request.method))
-        parallel(g.size(), request.threads, [&](std::size_t i) { solvers[i].emplace(g[i]); });
+    const auto solvers = solvers_of<sim2d::SlabSolver>(request);
     parallel(slices, request.threads, [&](std::size_t slice) {
         const double sigma = request.sigma.values[slice / g.size()];
         const std::size_t ig = slice % g.size();
-        std::vector<sim2d::SlabProfile> solved;
+        std::vector<sim2d::SlabProfile> solved(angles);
         if (solvers[ig]) solved = solvers[ig]->solve(sigma, request.theta_i.values, table.bins());
         for (std::size_t i = 0; i < angles; ++i) {
             const double theta_i = request.theta_i.values[i];
-            sim2d::SlabProfile both;
-            if (!solved.empty()) both = std::move(solved[i]);
-            const double error = solved.empty() ? 1 : std::max(both.back.standard_error, both.forward.standard_error);
+            const double error = solvers[ig] ? worst_error(solved[i]) : 1;
             if (wants_paths(request.method, error)) {
                 sim2d::SlabProfile traced = sim2d::trace_slab(
                     sigma, g[ig], theta_i, table.bins(), trace_options(request, cell_key(1, {sigma, g[ig], theta_i})));
-                if (std::max(traced.back.standard_error, traced.forward.standard_error) < error)
-                    both = std::move(traced);
+                if (!solvers[ig] || worst_error(traced) < error) solved[i] = std::move(traced);
             }
             const std::size_t cell = 2 * (slice * angles + i);
-            store(table, cell, both.back);
-            store(table, cell + 1, both.forward);
-            progress.add(2);
+            store(table, cell, solved[i].back);
+            store(table, cell + 1, solved[i].forward);
         }
+        progress.add(2 * angles);
     });
     return table;
 }

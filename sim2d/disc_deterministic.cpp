@@ -85,9 +85,7 @@ DiscGridSize automatic(double sigma, double g, const DiscOptions& options) {
     return size;
 }
 
-DiscGridSize coarser(const DiscGridSize& size) {
-    return {size.circles * 2 / 3, size.modes * 3 / 4, size.gap * 1.3};
-}
+DiscGridSize coarser(const DiscGridSize& size) { return {size.circles * 2 / 3, size.modes * 3 / 4, size.gap * 1.3}; }
 
 /// The error of a grid falls about as the third power of the radial step and the fifth of the gap: what the coarse grid
 /// misses is 1.5^3 (1.3^5) times what the fine one does, so fine + (fine - coarse) / (1.5^3 - 1) cancels most of it.

@@ -32,8 +32,8 @@ class DiscSolver {
     /// One Profile per h over `bins` bins of phi.
     /// @param sigma [1 / disc radius], >= 0   @param h offsets in [-1, 1]
     /// energy: closed form; energy_error: what the un-normalised answer misses of it; standard_error: relative
-    /// L2 difference of two grids, mostly well above the error of the (extrapolated) lobe; 0 without estimate_error, when
-    /// the fine grid alone answers, and at sigma = 0, which is exact; mean_length is not computed (0).
+    /// L2 difference of two grids, mostly well above the error of the (extrapolated) lobe; 0 without estimate_error,
+    /// when the fine grid alone answers, and at sigma = 0, which is exact; mean_length is not computed (0).
     std::vector<Profile> solve(double sigma, const std::vector<double>& h, std::size_t bins = 720) const;
 
   private:

@@ -160,7 +160,7 @@ std::vector<Profile> DiscSolver::solve(double sigma, const std::vector<double>& 
             error += difference[b] * difference[b];
         }
         profile.energy_error = std::abs(sum * width - 1) * profile.energy;
-        profile.standard_error = std::sqrt(error / square);
+        profile.standard_error = two_grids ? std::sqrt(error / square) + fine.residual : 0;
         for (double& x : profile.lobe) x /= sum * width;
         profiles.push_back(std::move(profile));
     }

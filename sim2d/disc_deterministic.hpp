@@ -23,7 +23,7 @@ struct DiscOptions {
 /// one solve runs on one thread, and its result does not depend on the others.
 class DiscSolver {
   public:
-    /// @param g mean cosine, in (-1, 1); the automatic grids are measured for [0, 0.95]
+    /// @param g mean cosine, in (-1, 1); the automatic grids are measured for sigma <= 16, [0, 0.95]
     explicit DiscSolver(double g, const DiscOptions& options = {});
     ~DiscSolver();
     DiscSolver(DiscSolver&&) noexcept;

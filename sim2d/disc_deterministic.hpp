@@ -23,7 +23,7 @@ struct DiscOptions {
 /// one solve runs on one thread, and its result does not depend on the others.
 class DiscSolver {
   public:
-    /// @param g mean cosine, in (-1, 1); the automatic grids are measured for [0, 0.95]
+    /// @param g mean cosine, in (-1, 1); the automatic grids are measured for sigma <= 16, [0, 0.95]
     explicit DiscSolver(double g, const DiscOptions& options = {});
     ~DiscSolver();
     DiscSolver(DiscSolver&&) noexcept;
@@ -31,8 +31,9 @@ class DiscSolver {
 
     /// One Profile per h over `bins` bins of phi.
     /// @param sigma [1 / disc radius], >= 0   @param h offsets in [-1, 1]
-    /// energy: closed form; energy_error: what the un-normalised answer misses of it; standard_error: estimated
-    /// relative L2 error of the lobe from two grids (0 without estimate_error); mean_length is not computed (0).
+    /// energy: closed form; energy_error: what the un-normalised answer misses of it; standard_error: relative
+    /// L2 difference of two grids, mostly well above the error of the (extrapolated) lobe; 0 without estimate_error,
+    /// when the fine grid alone answers, and at sigma = 0, which is exact; mean_length is not computed (0).
     std::vector<Profile> solve(double sigma, const std::vector<double>& h, std::size_t bins = 720) const;
 
   private:

@@ -51,7 +51,7 @@ struct ScatteringNode {
     float share[2];        ///< of TTs and TRTs in all lobes' energy there, times the node's share of the range
 };
 
-inline constexpr int most_scattering_nodes = 64;
+inline constexpr int most_scattering_nodes = 96;
 
 /// The fibre lit from theta_i over a range of offsets; a function of the exit (theta_r, phi). One offset alone
 /// (low == high, or nearly) is the near field.
@@ -277,8 +277,8 @@ MEDULLA_FN float place_panel(FarField<Channels>& far, float a, float b, GaussRul
     return most;
 }
 
-/// Nodes of the scattered lobes: 12 or 16 over psi for an ordinary medulla, more where g makes the lobe narrow against
-/// its shift; in a dense medulla TRTs lives within 1 / tau of the rim in psi, which then has panels of its own.
+/// Nodes of the scattered lobes: 8 over psi for either side of an ordinary medulla, more where g makes the lobe narrow
+/// against its shift; in a dense medulla TRTs lives within 1 / tau of the rim in psi, which then has panels of its own.
 template <int Channels>
 MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
     const FurParameters<Channels>& parameters = far.fibre().parameters;
@@ -286,9 +286,9 @@ MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
     far.nodes = 0;
     if (!(b > a)) return;
     const float width = 1 - std::abs(parameters.g);  // of planar HG's peak [radians]
-    const float per_panel = width > 0.2f ? 3.2f : (width > 0.1f ? 1.6f : 0.8f);
-    const int index = (width > 0.4f ? 1 : 2) + far.quality;
-    const GaussRule rule = gauss_rule(index < 0 ? 0 : (index > 2 ? 2 : index)), edge = gauss_rule(1);
+    const float per_panel = width > 0.2f ? 1.6f : (width > 0.1f ? 0.8f : 0.54f);
+    const int index = (width > 0.1f ? 0 : 1) + far.quality;
+    const GaussRule rule = gauss_rule(index < 0 ? 0 : index), edge = gauss_rule(1);
     const float tau = far.near.longitudinal.absorption.medulla_extinction * parameters.kappa;
     float most = 0, low = a, high = b;
     if (tau > 4) {
@@ -296,11 +296,16 @@ MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
         if (a < -rim) low = b < -rim ? b : -rim, most = place_panel(far, a, low, edge);
         if (b > rim && b > low) high = low > rim ? low : rim, most = std::fmax(most, place_panel(far, high, b, edge));
     }
-    const int wanted = 1 + int((high - low) / per_panel), room = (most_scattering_nodes - far.nodes) / (2 * rule.half);
-    const int panels = wanted < room ? wanted : room;
-    for (int i = 0; i < panels && high > low; ++i) {
-        const float step = (high - low) / float(panels);
-        most = std::fmax(most, place_panel(far, low + step * float(i), low + step * float(i + 1), rule));
+    // A low-rank lobe is not quite its own mirror image at h = 0, where the side changes: no panel crosses it.
+    const float cut[3] = {low, low < 0 && high > 0 ? 0.0f : high, high};
+    for (int part = 0; part < 2 && cut[part + 1] > cut[part]; ++part) {
+        const float length = cut[part + 1] - cut[part];
+        const int room = (most_scattering_nodes - far.nodes) / ((2 - part) * 2 * rule.half);
+        const int wanted = 1 + int(length / per_panel), panels = wanted < room ? wanted : room;
+        for (int i = 0; i < panels; ++i) {
+            const float step = length / float(panels), from = cut[part] + step * float(i);
+            most = std::fmax(most, place_panel(far, from, i + 1 == panels ? cut[part + 1] : from + step, rule));
+        }
     }
     if (most * float(far.nodes) < negligible_energy) far.nodes = 0;
 }

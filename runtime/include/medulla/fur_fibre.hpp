@@ -180,7 +180,8 @@ MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, 
 template <int Channels>
 MEDULLA_FN void longitudinal_lobes(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m, float theta_r,
                                    float phi, bool scattered, LobeValues<Channels>& lobes) noexcept {
-    for (int p = 0; p < 3; ++p) lobes.M[p] = m.gaussian[p].pdf(theta_r);
+    const Four M = pdf_of_three(m.gaussian, theta_r);
+    for (int p = 0; p < 3; ++p) lobes.M[p] = lane(M, p);
     if (!scattered) return;
     const float side = m.theta_i < 0 ? -theta_r : theta_r;
     const float t = std::abs(wrap_angle(phi)) * float(1 / pi);
@@ -208,13 +209,12 @@ struct NearField {
         LobeValues<Channels> result;
         if (!valid || !detail::within(theta_r, float(pi / 2)) || !detail::within(phi, 1e4f)) return result;
         longitudinal_lobes(*fibre, longitudinal, theta_r, phi, scattered, result);
-        for (int p = 0; p < 3; ++p) {
-            const float D = fibre->azimuthal_gaussian[p].pdf(phi - centre[p]);
-            for (int c = 0; c < Channels; ++c) result.N[p][c] = energy.A[p][c] * D;
-        }
+        const Four D = pdf_of_three(fibre->azimuthal_gaussian, centre, phi);
+        for (int p = 0; p < 3; ++p)
+            for (int c = 0; c < Channels; ++c) result.N[p][c] = energy.A[p][c] * lane(D, p);
         for (int p = 3; scattered && p < 5; ++p) {
-            const float D = lobe(fibre->azimuthal.view, azimuthal, side * (phi - centre[p]));
-            for (int c = 0; c < Channels; ++c) result.N[p][c] = energy.A[p][c] * D;
+            const float density = lobe(fibre->azimuthal.view, azimuthal, side * (phi - centre[p]));
+            for (int c = 0; c < Channels; ++c) result.N[p][c] = energy.A[p][c] * density;
         }
         return result;
     }

@@ -209,4 +209,27 @@ MEDULLA_FN T sample(const WrappedGaussian<T>& gaussian, T u, T v) noexcept {
     return wrap_angle(gaussian.deviation * radius * std::cos(T(2 * pi) * v));
 }
 
+/// Densities of three lobes at once, as their pdf(theta); lane 3 is 0.
+MEDULLA_FN Four pdf_of_three(const TruncatedGaussian<float> (&g)[3], float theta) noexcept {
+    const Four d = magnitude(Four(theta) - Four(g[0].origin, g[1].origin, g[2].origin, 0)) *
+                   Four(g[0].inverse, g[1].inverse, g[2].inverse, 0);
+    const Four beyond = Four(g[0].beyond, g[1].beyond, g[2].beyond, 0);
+    return Four(g[0].peak, g[1].peak, g[2].peak, 0) * real_math::exponential(Four(-0.5f) * d * (d + beyond + beyond));
+}
+
+/// Densities of three lobes at once, as their pdf(phi - centre), deviations ascending; lane 3 is 0.
+MEDULLA_FN Four pdf_of_three(const WrappedGaussian<float> (&g)[3], const float* centre, float phi) noexcept {
+    const Four delta = Four(phi) - Four(centre[0], centre[1], centre[2], phi);
+    if (g[2].deviation > 1.2f)
+        return Four(g[0].pdf(lane(delta, 0)), g[1].pdf(lane(delta, 1)), g[2].pdf(lane(delta, 2)), 0);
+    const Four x = delta - Four(float(2 * pi)) * nearest_integer(delta * Four(float(1 / (2 * pi))));
+    const Four inverse = Four(g[0].inverse, g[1].inverse, g[2].inverse, 0), z = x * inverse;
+    Four sum = real_math::exponential(Four(-0.5f) * z * z);
+    if (g[2].deviation > 0.25f) {  // as in images(): below that the other images are 0 to float
+        const Four turn = Four(float(2 * pi)) * inverse, p = z + turn, q = z - turn;
+        sum = sum + real_math::exponential(Four(-0.5f) * p * p) + real_math::exponential(Four(-0.5f) * q * q);
+    }
+    return Four(g[0].peak, g[1].peak, g[2].peak, 0) * sum;
+}
+
 }  // namespace medulla

@@ -1,6 +1,5 @@
 #include "sim2d/disc_transport.hpp"
 
-#define EIGEN_DONT_PARALLELIZE
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>

@@ -70,10 +70,19 @@ sim2d::TraceOptions trace_options(const Request& request, std::uint64_t cell) {
     return options;
 }
 
-/// `auto` asks the random tracer where the noise-free solver's own estimate is worse than a thousandth.
-bool wants_paths(Method method, double error) {
-    if (method == Method::deterministic) return false;
-    return method != Method::automatic || error > 1e-3;
+/// Relative L2 error that counting `paths` exits would leave on a lobe: sum p (1 - p) / (n sum p^2), p the bins'
+/// shares.
+double tracer_error(const sim2d::Profile& profile, std::uint64_t paths) {
+    double sum = 0, squares = 0;
+    for (const double value : profile.lobe) sum += value, squares += value * value;
+    return std::sqrt((sum * sum / squares - 1) / static_cast<double>(paths));
+}
+
+/// Whether a cell is (also) traced: always by the random methods; by `auto` where counting paths would beat the
+/// noise-free solver's own estimate.
+bool wants_paths(const Request& request, const sim2d::Profile& solved) {
+    if (request.method != Method::automatic) return request.method != Method::deterministic;
+    return solved.standard_error > tracer_error(solved, request.paths);
 }
 
 double worst_error(const sim2d::SlabProfile& p) { return std::max(p.back.standard_error, p.forward.standard_error); }
@@ -111,11 +120,11 @@ Table simulate_azimuthal(const Request& request, ProgressMode mode) {
         std::vector<sim2d::Profile> solved(offsets);
         if (solvers[ig]) solved = solvers[ig]->solve(sigma, request.h.values, request.bins);
         for (std::size_t i = 0; i < offsets; ++i) {
-            const double h = request.h.values[i], error = solvers[ig] ? solved[i].standard_error : 1;
-            if (wants_paths(request.method, error)) {
+            const double h = request.h.values[i];
+            if (wants_paths(request, solved[i])) {
                 sim2d::Profile traced = sim2d::trace_disc(sigma, g[ig], h, request.bins,
                                                           trace_options(request, cell_key(0, {sigma, g[ig], h})));
-                if (!solvers[ig] || traced.standard_error < error) solved[i] = std::move(traced);
+                if (!solvers[ig] || traced.standard_error < solved[i].standard_error) solved[i] = std::move(traced);
             }
             store(table, slice * offsets + i, solved[i]);
         }
@@ -140,11 +149,10 @@ Table simulate_longitudinal(const Request& request, ProgressMode mode) {
         if (solvers[ig]) solved = solvers[ig]->solve(sigma, request.theta_i.values, table.bins());
         for (std::size_t i = 0; i < angles; ++i) {
             const double theta_i = request.theta_i.values[i];
-            const double error = solvers[ig] ? worst_error(solved[i]) : 1;
-            if (wants_paths(request.method, error)) {
+            if (wants_paths(request, solved[i].back) || wants_paths(request, solved[i].forward)) {
                 sim2d::SlabProfile traced = sim2d::trace_slab(
                     sigma, g[ig], theta_i, table.bins(), trace_options(request, cell_key(1, {sigma, g[ig], theta_i})));
-                if (!solvers[ig] || worst_error(traced) < error) solved[i] = std::move(traced);
+                if (!solvers[ig] || worst_error(traced) < worst_error(solved[i])) solved[i] = std::move(traced);
             }
             const std::size_t cell = 2 * (slice * angles + i);
             store(table, cell, solved[i].back);

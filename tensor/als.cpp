@@ -23,7 +23,10 @@ Eigen::MatrixXd gram_product(const std::vector<Eigen::MatrixXd>& grams, std::siz
 Fit als_sweeps(const SplitTensor& tensor, double scale, Factors start, const CpOptions& options) {
     const std::size_t order = tensor.shape().size();
     const double ridge = options.ridge.value_or(0.0), epsilon = std::numeric_limits<double>::epsilon();
+    const int max_sweeps = options.max_sweeps.value_or(500);
+    const double tolerance = options.tolerance.value_or(1e-6);
     Fit fit;
+    fit.ridge = ridge;
     fit.factors = std::move(start);
     Factors& factors = fit.factors;
     std::vector<Eigen::MatrixXd> grams(order);
@@ -34,7 +37,7 @@ Fit als_sweeps(const SplitTensor& tensor, double scale, Factors start, const CpO
     const Eigen::Index rank = factors[0].cols();
     fit.weights = Eigen::VectorXd::Constant(rank, 1 / std::sqrt(static_cast<double>(rank)));
     RowMatrix side, matricised;
-    for (int sweep = 0; sweep < options.max_sweeps; ++sweep) {
+    for (int sweep = 0; sweep < max_sweeps; ++sweep) {
         for (std::size_t k = 0; k < order; ++k) {
             if (k == 0) side = tensor.down(factors, scale);
             if (k == tensor.split()) side = tensor.across(factors, scale);
@@ -71,7 +74,7 @@ Fit als_sweeps(const SplitTensor& tensor, double scale, Factors start, const CpO
             fit.stop = Stop::exact;
             break;
         }
-        if (is_flat(fit.trace, options.tolerance)) {
+        if (is_flat(fit.trace, tolerance)) {
             fit.stop = Stop::converged;
             break;
         }
@@ -98,7 +101,7 @@ CpResult cp_als(const Tensor& tensor, const CpOptions& options) {
     } else {
         const SplitTensor split(input.tensor().values.data(), tensor.shape);
         Fit best;
-        for (int start = 0; start < options.restarts; ++start) {
+        for (int start = 0; start < options.restarts.value_or(1); ++start) {
             Fit fit = als_sweeps(split, 1 / input.norm(),
                                  gaussian_factors(tensor.shape, options.rank, options.seed, start), options);
             result.report.starts.push_back(fit.error);

@@ -11,6 +11,7 @@ struct Fit {
     Factors factors;
     Eigen::VectorXd weights;
     double error = 0;  ///< |scale * tensor - model|, the scaled tensor having norm 1
+    double ridge = 0;  ///< in force
     int iterations = 0;
     Stop stop = Stop::sweeps;
     std::vector<double> trace;

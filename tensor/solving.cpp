@@ -24,11 +24,11 @@ double uniform(std::uint64_t bits) { return (static_cast<double>(bits >> 11) + 0
 
 void require_valid(const CpOptions& options) {
     if (options.rank < 1) throw std::invalid_argument("cp: rank " + std::to_string(options.rank) + " is below 1");
-    if (options.max_sweeps < 1)
-        throw std::invalid_argument("cp: max_sweeps " + std::to_string(options.max_sweeps) + " is below 1");
-    if (options.restarts < 1)
-        throw std::invalid_argument("cp: restarts " + std::to_string(options.restarts) + " is below 1");
-    if (!(options.tolerance >= 0)) throw std::invalid_argument("cp: tolerance must be 0 or more");
+    if (options.max_sweeps && *options.max_sweeps < 1)
+        throw std::invalid_argument("cp: max_sweeps " + std::to_string(*options.max_sweeps) + " is below 1");
+    if (options.restarts && *options.restarts < 1)
+        throw std::invalid_argument("cp: restarts " + std::to_string(*options.restarts) + " is below 1");
+    if (options.tolerance && !(*options.tolerance >= 0)) throw std::invalid_argument("cp: tolerance must be 0 or more");
     if (options.ridge && !(*options.ridge >= 0 && std::isfinite(*options.ridge)))
         throw std::invalid_argument("cp: ridge must be 0 or more, and finite");
     if (options.truncation && !(*options.truncation >= 0 && *options.truncation < 1))

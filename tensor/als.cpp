@@ -1,162 +1,123 @@
-// Plain CP-ALS on the full tensor: the slow twin of every faster solver, and the paper's own method.
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+// CP-ALS: each factor in turn is the least-squares solution with the others held.
+// Kolda & Bader 2009, section 3.4; the ridge on balanced factors is Tikhonov's, see CpOptions.
+#include "tensor/als.hpp"
+
 #include <chrono>
 #include <cmath>
-#include <random>
-
-#include "tensor/cp.hpp"
+#include <limits>
 
 namespace medulla::tensor {
+
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-/// Matricised tensor times Khatri-Rao product for one mode, the product never formed: the tensor is contracted with
-/// one factor after the other, the last axes first.
-MatrixXd mttkrp(const std::vector<double>& x, const std::vector<std::size_t>& shape, const std::vector<MatrixXd>& u,
-                std::size_t mode) {
-    const Index rank = u[0].cols();
-    Index left = 1, right = 1;
-    for (std::size_t k = 0; k < mode; ++k) left *= static_cast<Index>(shape[k]);
-    for (std::size_t k = mode + 1; k < shape.size(); ++k) right *= static_cast<Index>(shape[k]);
-    const auto n = static_cast<Index>(shape[mode]);
-    const auto products = [&](std::size_t first, std::size_t last) {  // Khatri-Rao of a few small factors
-        MatrixXd p = MatrixXd::Ones(1, rank);
-        for (std::size_t k = first; k < last; ++k) {
-            MatrixXd next(p.rows() * u[k].rows(), rank);
-            for (Index i = 0; i < p.rows(); ++i)
-                for (Index j = 0; j < u[k].rows(); ++j)
-                    next.row(i * u[k].rows() + j) = p.row(i).cwiseProduct(u[k].row(j));
-            p = std::move(next);
-        }
-        return p;
-    };
-    const MatrixXd a = products(0, mode), b = products(mode + 1, shape.size());
-    // Every row of the result belongs to one thread, so sums have one order for any number of threads.
-    MatrixXd result = MatrixXd::Zero(n, rank);
-    if (right == 1) {
-        const Eigen::Map<const RowMajor> matrix(x.data(), left, n);
-#pragma omp parallel for schedule(static)
-        for (Index block = 0; block < n; block += 32) {
-            const Index rows = std::min<Index>(32, n - block);
-            result.middleRows(block, rows).noalias() = matrix.middleCols(block, rows).transpose() * a;
-        }
-        return result;
-    }
-#pragma omp parallel for schedule(static)
-    for (Index i = 0; i < n; ++i) {
-        const Eigen::Map<const RowMajor, 0, Eigen::OuterStride<>> slice(x.data() + i * right, left, right,
-                                                                        Eigen::OuterStride<>(n * right));
-        const MatrixXd contracted = slice * b;
-        result.row(i) = contracted.cwiseProduct(a).colwise().sum();
-    }
-    return result;
-}
-
-/// Solves f * gram = m for f, with a small ridge; a rank-revealing solve where Cholesky fails.
-MatrixXd solve_normal(const MatrixXd& gram, const MatrixXd& m, double ridge) {
-    const Index rank = gram.rows();
-    const MatrixXd damped = gram + MatrixXd::Identity(rank, rank) * (ridge * gram.trace() / static_cast<double>(rank));
-    const Eigen::LLT<MatrixXd> cholesky(damped);
-    if (cholesky.info() == Eigen::Success) {
-        const MatrixXd f = cholesky.solve(m.transpose()).transpose();
-        if (f.allFinite()) return f;
-    }
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(damped);
-    const double least = eigen.eigenvalues().maxCoeff() * 1e-14;  // below it a direction is rounding
-    const VectorXd inverse = eigen.eigenvalues().unaryExpr([&](double w) { return w > least ? 1 / w : 0.0; });
-    return m * eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
-}
-
-VectorXd normalise(MatrixXd& factor) {
-    VectorXd norms = factor.colwise().norm();
-    for (Index r = 0; r < norms.size(); ++r)
-        if (norms[r] > 0) factor.col(r) /= norms[r];
-    return norms;
-}
-
-MatrixXd gram_product(const std::vector<MatrixXd>& grams, std::size_t skip) {
-    MatrixXd product = MatrixXd::Ones(grams[0].rows(), grams[0].cols());
+/// Hadamard product of the Grams of all modes but `skip` (pass the order to skip none).
+Eigen::MatrixXd gram_product(const std::vector<Eigen::MatrixXd>& grams, std::size_t skip) {
+    Eigen::MatrixXd product = Eigen::MatrixXd::Ones(grams[0].rows(), grams[0].cols());
     for (std::size_t k = 0; k < grams.size(); ++k)
-        if (k != skip) product = product.cwiseProduct(grams[k]);
+        if (k != skip) product.array() *= grams[k].array();
     return product;
 }
 
 }  // namespace
 
-CpResult cp_als(const Tensor& tensor, const CpOptions& options) {
-    const auto start = std::chrono::steady_clock::now();
-    const double scale = checked_scale(tensor);
-    const std::size_t order = tensor.order();
-    CpResult result;
-    result.report.solver = "als";
-    std::vector<MatrixXd> u;
-    std::mt19937_64 random(options.seed);
-    for (const std::size_t n : tensor.shape) {
-        MatrixXd factor(static_cast<Index>(n), options.rank);
-        for (Index r = 0; r < factor.cols(); ++r)
-            for (Index i = 0; i < factor.rows(); ++i)
-                factor(i, r) = static_cast<double>(random() >> 11) * 0x1p-53;  // [0, 1): the same on every platform
-        normalise(factor);
-        u.push_back(std::move(factor));
+Fit als_sweeps(const SplitTensor& tensor, double scale, Factors start, const CpOptions& options) {
+    const std::size_t order = tensor.shape().size();
+    const double ridge = options.ridge.value_or(0.0), epsilon = std::numeric_limits<double>::epsilon();
+    const int max_sweeps = options.max_sweeps.value_or(500);
+    const double tolerance = options.tolerance.value_or(1e-6);
+    Fit fit;
+    fit.ridge = ridge;
+    fit.factors = std::move(start);
+    Factors& factors = fit.factors;
+    std::vector<Eigen::MatrixXd> grams(order);
+    for (std::size_t k = 0; k < order; ++k) {
+        normalise_columns(factors[k], factors[k]);
+        grams[k] = factors[k].transpose() * factors[k];
     }
-    VectorXd weights = VectorXd::Zero(options.rank);
-    if (scale == 0) {
-        result.model = {weights, u};
-        result.report.stop = Stop::zero_tensor;
-        return result;
-    }
-    std::vector<double> x(tensor.values);
-    double norm2 = 0;
-    for (double& v : x) {
-        v /= scale;
-        norm2 += v * v;
-    }
-    std::vector<MatrixXd> grams;
-    for (const MatrixXd& factor : u) grams.push_back(factor.transpose() * factor);
-    double error = 1;
-    std::vector<double> history;
-    for (int sweep = 0; sweep < options.max_sweeps; ++sweep) {
-        MatrixXd m;
+    const Eigen::Index rank = factors[0].cols();
+    fit.weights = Eigen::VectorXd::Constant(rank, 1 / std::sqrt(static_cast<double>(rank)));
+    RowMatrix side, matricised;
+    for (int sweep = 0; sweep < max_sweeps; ++sweep) {
         for (std::size_t k = 0; k < order; ++k) {
-            m = mttkrp(x, tensor.shape, u, k);
-            u[k] = solve_normal(gram_product(grams, k), m, options.ridge);
-            weights = normalise(u[k]);
-            grams[k] = u[k].transpose() * u[k];
-        }
-        // |X - M|^2 from the last mode's product, without another pass; its rounding floor is about 1e-8 |X|.
-        const double inner = m.cwiseProduct(u.back() * weights.asDiagonal()).sum();
-        const double model2 = weights.dot(gram_product(grams, order) * weights);
-        error = std::sqrt(std::max(0.0, norm2 + model2 - 2 * inner) / norm2);
-        history.push_back(error);
-        result.report.iterations = sweep + 1;
-        if (error < 1e-8) {
-            // Near an exact fit the formula above is all cancellation: look at the residual itself.
-            result.model = {weights * scale, u};
-            error = relative_error(result.model, tensor);
-            if (error < 1e-14 * std::sqrt(static_cast<double>(tensor.size()))) {
-                result.report.stop = Stop::exact;
-                break;
+            if (k == 0) side = tensor.down(factors, scale);
+            if (k == tensor.split()) side = tensor.across(factors, scale);
+            matricised = tensor.mode(side, factors, k);
+            Eigen::MatrixXd gram = gram_product(grams, k);
+            RowMatrix right = matricised;
+            // Balanced columns have length w^(1/N): with the others' lengths t = w^((N-1)/N) taken out, the penalty on
+            // this factor times t is ridge / t^2. A component of weight 0 is dead then, and stays so.
+            for (Eigen::Index r = 0; r < rank && ridge > 0 && order > 1; ++r) {
+                const double t2 = std::pow(fit.weights[r], 2 - 2 / static_cast<double>(order));
+                if (ridge < t2 / epsilon) {
+                    gram(r, r) += ridge / t2;
+                } else {
+                    gram.row(r).setZero();
+                    gram.col(r).setZero();
+                    right.col(r).setZero();
+                }
             }
-            history.back() = error;
+            RowMatrix factor = solve_gram(gram, right);
+            fit.weights = normalise_columns(factor, factors[k]);
+            factors[k] = std::move(factor);
+            grams[k] = factors[k].transpose() * factors[k];
         }
-        const std::size_t n = history.size();
-        // Ten sweeps in a row that together won less than ten tolerances: a swamp moves more than that.
-        if (n > 10 && history[n - 11] - error < 10 * options.tolerance * error) {
-            result.report.stop = Stop::converged;
+        // |x - m|^2 = 1 - 2 <x, m> + |m|^2; rounding is that of terms up to (sum of weights)^2.
+        const double total = fit.weights.sum();
+        const double product = (matricised.array() * factors[order - 1].array()).colwise().sum().matrix() * fit.weights;
+        double squared = 1 - 2 * product + fit.weights.dot(gram_product(grams, order) * fit.weights);
+        if (squared < 1e5 * epsilon * (1 + total * total))
+            squared = tensor.residual_squared(factors, fit.weights, scale);
+        fit.error = std::sqrt(squared);
+        fit.trace.push_back(fit.error);
+        fit.iterations = sweep + 1;
+        if (fit.error <= rounding_floor(order, options.rank, total)) {
+            fit.stop = Stop::exact;
+            break;
+        }
+        if (is_flat(fit.trace, tolerance)) {
+            fit.stop = Stop::converged;
             break;
         }
     }
-    result.model = {weights * scale, u};
-    result.report.relative_error = relative_error(result.model, tensor);
-    result.report.degeneracy.norm_ratio = weights.sum() / std::sqrt(norm2);
-    MatrixXd cosines = gram_product(grams, order);
-    result.report.degeneracy.least_cosine = cosines.minCoeff();
-    result.report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return fit;
+}
+
+CpModel to_model(const Fit& fit, const Normalised& input) {
+    CpModel model;
+    model.factors.assign(fit.factors.begin(), fit.factors.end());
+    model.weights = fit.weights;
+    canonicalise(model);
+    for (double& weight : model.weights) weight = input.restore(weight);
+    return model;
+}
+
+CpResult cp_als(const Tensor& tensor, const CpOptions& options) {
+    const auto begin = std::chrono::steady_clock::now();
+    require_valid(options);
+    const Normalised input(tensor);
+    CpResult result;
+    if (input.norm() == 0) {
+        result = zero_result(tensor.shape, options);
+    } else {
+        const SplitTensor split(input.tensor().values.data(), tensor.shape);
+        Fit best;
+        for (int start = 0; start < options.restarts.value_or(1); ++start) {
+            Fit fit = als_sweeps(split, 1 / input.norm(),
+                                 gaussian_factors(tensor.shape, options.rank, options.seed, start), options);
+            result.report.starts.push_back(fit.error);
+            if (start == 0 || fit.error < best.error) best = std::move(fit);
+        }
+        result.model = to_model(best, input);
+        result.report.iterations = best.iterations;
+        result.report.relative_error = best.error;
+        result.report.stop = best.stop;
+        result.report.trace = best.trace;
+        result.report.core = tensor.shape;
+        result.report.degeneracy = degeneracy(result.model, input.restore(1));
+    }
+    result.report.solver = "als";
+    result.report.ridge = options.ridge.value_or(0.0);
+    result.report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return result;
 }
 

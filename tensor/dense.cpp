@@ -1,29 +1,85 @@
+// Shapes, validity and norms of dense tensors.
+// Rests on dense.hpp alone.
 #include "tensor/dense.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
-#include <string>
 
 namespace medulla::tensor {
 
-double checked_scale(const Tensor& tensor) {
-    std::size_t expected = 1;
-    for (const std::size_t n : tensor.shape) expected *= n;
-    if (tensor.shape.empty() || expected == 0 || expected != tensor.size())
-        throw std::invalid_argument("tensor: its shape asks for " + std::to_string(expected) + " values, it has " +
-                                    std::to_string(tensor.size()));
-    double greatest = 0;
-    for (std::size_t i = 0; i < tensor.size(); ++i) {
-        if (!std::isfinite(tensor.values[i])) {
-            std::string index;
-            std::size_t rest = i;
-            for (std::size_t k = tensor.order(); k-- > 0; rest /= tensor.shape[k])
-                index = std::to_string(rest % tensor.shape[k]) + (index.empty() ? "" : ", ") + index;
-            throw std::invalid_argument("tensor: value [" + index + "] is not finite");
-        }
-        greatest = std::fmax(greatest, std::abs(tensor.values[i]));
+namespace {
+
+std::size_t cell_count(const std::vector<std::size_t>& shape) {
+    if (shape.empty()) throw std::invalid_argument("tensor: a shape needs at least one axis");
+    std::size_t count = 1;
+    for (std::size_t k = 0; k < shape.size(); ++k) {
+        if (shape[k] == 0) throw std::invalid_argument("tensor: axis " + std::to_string(k) + " has no node");
+        if (count > std::numeric_limits<std::size_t>::max() / sizeof(double) / shape[k])
+            throw std::invalid_argument("tensor: more cells than memory can address");
+        count *= shape[k];
     }
-    return greatest;
+    return count;
+}
+
+}  // namespace
+
+Tensor::Tensor(std::vector<std::size_t> s) : shape(std::move(s)), values(cell_count(shape), 0.0) {}
+
+std::size_t Tensor::offset(std::initializer_list<std::size_t> index) const {
+    std::size_t position = 0, k = 0;
+    for (std::size_t i : index) position = position * shape[k++] + i;
+    return position;
+}
+
+std::string index_text(const std::vector<std::size_t>& shape, std::size_t position) {
+    std::string text = "]";
+    for (std::size_t k = shape.size(); k-- > 0; position /= shape[k])
+        text = (k > 0 ? ", " : "[") + std::to_string(position % shape[k]) + text;
+    return text;
+}
+
+void require_valid(const Tensor& tensor) {
+    const std::size_t cells = cell_count(tensor.shape);
+    if (cells != tensor.size())
+        throw std::invalid_argument("tensor: the shape has " + std::to_string(cells) + " cells, but there are " +
+                                    std::to_string(tensor.size()) + " values");
+    const auto bad =
+        std::find_if(tensor.values.begin(), tensor.values.end(), [](double x) { return !std::isfinite(x); });
+    if (bad != tensor.values.end())
+        throw std::invalid_argument("tensor: cell " +
+                                    index_text(tensor.shape, static_cast<std::size_t>(bad - tensor.values.begin())) +
+                                    " is " + (std::isnan(*bad) ? "not a number" : "infinite"));
+}
+
+double max_abs(const Tensor& tensor) {
+    double largest = 0;
+    for (double x : tensor.values) largest = std::max(largest, std::abs(x));
+    return largest;
+}
+
+double norm(const Tensor& tensor) {
+    const double largest = max_abs(tensor);
+    if (largest == 0) return 0;
+    const int exponent = std::ilogb(largest);
+    double sum = 0;
+    if (std::abs(exponent) <= 400) {
+        // Squares stay within 2^+-800 and 2^60 of them below 2^1024; what underflows is 2^-100 of the largest.
+        for (double x : tensor.values) sum += x * x;
+        return std::sqrt(sum);
+    }
+    for (double x : tensor.values) {
+        const double y = std::ldexp(x, -exponent);
+        sum += y * y;
+    }
+    return std::ldexp(std::sqrt(sum), exponent);
+}
+
+Tensor scaled(const Tensor& tensor, int exponent) {
+    Tensor result = tensor;
+    for (double& x : result.values) x = std::ldexp(x, exponent);
+    return result;
 }
 
 }  // namespace medulla::tensor

@@ -1,0 +1,161 @@
+// The fast paths: solve on the core of a truncated HOSVD, then expand the factors by its bases.
+// Bro & Andersson 1998: |x - m|^2 = |core - m_core|^2 + |x - core x bases|^2, so nothing is lost but the truncation.
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <memory>
+
+#include "tensor/als.hpp"
+#include "tensor/hosvd.hpp"
+#include "tensor/lm.hpp"
+
+namespace medulla::tensor {
+
+namespace {
+
+/// A core, ready to be solved on. Kept in place: `split` borrows the core's values.
+struct Level {
+    Hosvd hosvd;
+    double norm;  ///< of the core
+    SplitTensor split;
+    explicit Level(Hosvd h)
+        : hosvd(std::move(h)),
+          norm(medulla::tensor::norm(hosvd.core)),
+          split(hosvd.core.values.data(), hosvd.core.shape) {}
+    Level(const Level&) = delete;
+    Level& operator=(const Level&) = delete;
+
+    double total_error(const Fit& fit, double tensor_norm) const {
+        return std::hypot(fit.error * norm / tensor_norm, hosvd.error);
+    }
+};
+
+/// Factors whose columns carry the weights, evenly over the modes.
+Factors balanced(const Fit& fit) {
+    Factors factors = fit.factors;
+    const double share = 1 / static_cast<double>(factors.size());
+    for (RowMatrix& f : factors) f = f * fit.weights.array().pow(share).matrix().asDiagonal();
+    return factors;
+}
+
+/// The same factors in the coordinates of other bases of the same space.
+Factors changed_basis(Factors factors, const std::vector<Eigen::MatrixXd>& from,
+                      const std::vector<Eigen::MatrixXd>& to) {
+    for (std::size_t k = 0; k < factors.size(); ++k) factors[k] = (to[k].transpose() * (from[k] * factors[k])).eval();
+    return factors;
+}
+
+/// What both compressed solvers do: a first solve, and where its error comes near the truncation, finer cores.
+struct Recipe {
+    double truncation;                                            ///< of the first core
+    std::function<Fit(const Level&, CpReport&)> first;            ///< all starts
+    std::function<Fit(const Level&, const Fit&, Factors)> again;  ///< goes on, on a finer core
+};
+
+CpResult solve_compressed(const Tensor& tensor, const CpOptions& options, const Recipe& recipe, const char* name) {
+    const auto begin = std::chrono::steady_clock::now();
+    require_valid(options);
+    const Normalised input(tensor);
+    CpResult result;
+    CpReport& report = result.report;
+    if (input.norm() == 0) {
+        result = zero_result(tensor.shape, options);
+    } else {
+        double truncation = options.truncation.value_or(recipe.truncation);
+        auto level = std::make_unique<Level>(truncated_hosvd(input.tensor(), truncation));
+        Fit fit = recipe.first(*level, report);
+        // At an eighth of the error the truncation adds 1/128 to it.
+        while (!options.truncation && truncation > finest_truncation &&
+               level->total_error(fit, input.norm()) < 8 * truncation) {
+            truncation = std::max(finest_truncation, truncation / 30);
+            auto finer = std::make_unique<Level>(truncated_hosvd(input.tensor(), truncation));
+            const int before = fit.iterations;
+            std::vector<double> trace = std::move(fit.trace);
+            fit = recipe.again(*finer, fit, changed_basis(balanced(fit), level->hosvd.bases, finer->hosvd.bases));
+            trace.insert(trace.end(), fit.trace.begin(), fit.trace.end());
+            fit.trace = std::move(trace);
+            fit.iterations += before;
+            level = std::move(finer);
+        }
+        for (std::size_t k = 0; k < fit.factors.size(); ++k)
+            fit.factors[k] = (level->hosvd.bases[k] * fit.factors[k]).eval();
+        fit.weights *= level->norm / input.norm();
+        result.model = to_model(fit, input);
+        report.iterations = fit.iterations;
+        report.stop = fit.stop;
+        report.trace = fit.trace;
+        report.core = level->hosvd.core.shape;
+        report.truncation_error = level->hosvd.error;
+        report.ridge = fit.ridge;
+        report.degeneracy = degeneracy(result.model, input.restore(1));
+        report.relative_error = level->total_error(fit, input.norm());
+        // Gram matrices know the truncation to 1e-8 at best: near there, measure.
+        if (report.relative_error < 1e-5) report.relative_error = relative_error(tensor, result.model);
+    }
+    report.solver = name;
+    report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return result;
+}
+
+}  // namespace
+
+CpResult cp_als_compressed(const Tensor& tensor, const CpOptions& options) {
+    Recipe recipe;
+    recipe.truncation = options.rank <= 32 ? 1e-3 : 2e-4;
+    recipe.first = [&](const Level& level, CpReport& report) {
+        Fit best;
+        for (int start = 0; start < options.restarts.value_or(1); ++start) {
+            Fit fit = als_sweeps(level.split, 1 / level.norm,
+                                 gaussian_factors(level.hosvd.core.shape, options.rank, options.seed, start), options);
+            report.starts.push_back(fit.error);
+            if (start == 0 || fit.error < best.error) best = std::move(fit);
+        }
+        return best;
+    };
+    recipe.again = [&](const Level& level, const Fit&, Factors start) {
+        return als_sweeps(level.split, 1 / level.norm, std::move(start), options);
+    };
+    return solve_compressed(tensor, options, recipe, "compressed als");
+}
+
+CpResult cp_lm(const Tensor& tensor, const CpOptions& options) {
+    const double tolerance = options.tolerance.value_or(1e-3);
+    const int steps = options.max_sweeps.value_or(200);
+    const auto solve = [&](const Level& level, Factors start, double ridge) {
+        return lm_steps(level.split, 1 / level.norm, std::move(start), ridge, steps, tolerance);
+    };
+    Recipe recipe;
+    recipe.truncation = options.rank <= 32 ? 1e-3 : 2e-4;
+    recipe.first = [&](const Level& level, CpReport& report) {
+        const double ridge = options.ridge.value_or(options.rank < 32 ? 1e-5 : 1e-6);
+        Fit best;
+        for (int start = 0; start < options.restarts.value_or(options.rank <= 32 ? 4 : 1); ++start) {
+            Factors factors = gaussian_factors(level.hosvd.core.shape, options.rank, options.seed, start);
+            // Columns about as long as those of `rank` equal orthogonal components that make up the tensor.
+            for (RowMatrix& f : factors)
+                f *= std::pow(options.rank, -0.5 / static_cast<double>(factors.size())) /
+                     std::sqrt(static_cast<double>(f.rows()));
+            Fit fit = solve(level, std::move(factors), ridge);
+            report.starts.push_back(fit.error);
+            if (start == 0 || fit.error < best.error) best = std::move(fit);
+        }
+        return best;
+    };
+    recipe.again = [&](const Level& level, const Fit& before, Factors start) {
+        // A fit this good is worth a smaller ridge, as long as components do not begin to cancel.
+        double ridge = before.ridge;
+        Fit fit = solve(level, std::move(start), ridge);
+        while (!options.ridge && ridge > 0 && fit.stop != Stop::exact) {
+            ridge = ridge > 1e-15 ? ridge / 100 : 0;
+            Fit next = solve(level, balanced(fit), ridge);
+            if (next.weights.sum() > 10 || next.error > 0.98 * fit.error) break;
+            next.trace.insert(next.trace.begin(), fit.trace.begin(), fit.trace.end());
+            next.iterations += fit.iterations;
+            fit = std::move(next);
+        }
+        return fit;
+    };
+    return solve_compressed(tensor, options, recipe, "lm");
+}
+
+}  // namespace medulla::tensor

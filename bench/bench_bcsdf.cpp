@@ -80,7 +80,7 @@ void bench_lookups(const PackView& pack, const std::string& label) {
            nanoseconds(int(q.size()),
                        [&] {
                            float sum = 0;
-                           for (const Query& x : q) sum += lobe(view, c, x.phi);
+                           for (const Query& x : q) sum += lobe(material, c, x.phi);
                            sink = sum;
                        }),
            "ns");
@@ -90,7 +90,7 @@ void bench_lookups(const PackView& pack, const std::string& label) {
                            float sum = 0;
                            for (const Query& x : q) {
                                contract(material, 2 + x.theta_i, std::abs(x.h), c);
-                               sum += lobe(view, c, x.phi) + lobe(view, c, x.theta_r);
+                               sum += lobe(material, c, x.phi) + lobe(material, c, x.theta_r);
                            }
                            sink = sum;
                        }),

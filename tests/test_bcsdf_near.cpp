@@ -40,6 +40,26 @@ TEST_CASE("the analytic pack is valid and gives its closed forms back", "[bcsdf]
             }
 }
 
+TEST_CASE("a search that starts from an index finds the same cell on uneven axes", "[bcsdf]") {
+    std::vector<double> t = {0, 1e-3, 2e-3, 4e-3, 4.1e-3, 0.3, 0.5, 0.50001, 0.9, 16};
+    for (bool periodic : {false, true}) {
+        const auto knots = analytic::packed_knots<float>(analytic::with_ghosts(t, periodic));
+        const AxisView<float> axis = {reinterpret_cast<const unsigned char*>(knots.data()), std::uint32_t(t.size() - 1),
+                                      periodic};
+        const AxisIndex<float> index = index_axis(axis);
+        std::mt19937 random(3);
+        std::uniform_real_distribution<float> u(0, 1);
+        for (int i = 0; i < 20000; ++i) {
+            const float power = std::pow(u(random), 8.0f), knot = float(t[std::size_t(i) % t.size()]);
+            const float x =
+                i % 3 == 0 ? 18 * power - 1 : (i % 3 == 1 ? knot : std::nextafter(knot, i % 2 ? -1.0f : 20.0f));
+            const Cell<float> a = locate(axis, x), b = locate(axis, index, x);
+            REQUIRE(a.span == b.span);
+            REQUIRE(a.x == b.x);
+        }
+    }
+}
+
 TEST_CASE("near field equals the double-precision twin", "[bcsdf]") {
     std::mt19937 random(1);
     std::uniform_real_distribution<float> u(0, 1);

@@ -380,10 +380,10 @@ MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, floa
     Contraction contraction;
     for (int i = 0; i < far.nodes; ++i) {
         const ScatteringNode<Channels>& n = far.node[i];
-        contract_axis(table.view, table.last_axis, n.offset, far.sigma_weight, contraction.weight);
+        contract_axis(table.view, table.last_axis, last_point(table, n.offset), far.sigma_weight, contraction.weight);
         contraction.inverse_integral = inverse_integral(table.view, contraction.weight);
         for (int p = 0; p < 2; ++p) {
-            const float D = lobe(table.view, contraction, n.side * (phi - n.centre[p]));
+            const float D = lobe(table, contraction, n.side * (phi - n.centre[p]));
             for (int c = 0; c < Channels; ++c) N[p][c] += n.A[p][c] * D;
         }
     }

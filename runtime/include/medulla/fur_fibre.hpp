@@ -28,7 +28,8 @@ namespace medulla {
 struct MaterialTable {
     TableView view;
     std::uint32_t sigma_axis = 0, last_axis = 0;  ///< the two axes left: sigma, and h or theta_i
-    alignas(32) float weight[max_rank] = {};      ///< [0, rank_stride) is set
+    AxisIndex<float> sigma_index = {}, last_index = {}, exit_index = {};
+    alignas(32) float weight[max_rank] = {};  ///< [0, rank_stride) is set
 };
 
 MEDULLA_FN void prepare_table(const TableView& view, float g, MaterialTable& table) noexcept {
@@ -49,6 +50,25 @@ MEDULLA_FN void prepare_table(const TableView& view, float g, MaterialTable& tab
                 table.last_axis = k;
         }
     }
+    table.sigma_index = index_axis(view.axis(table.sigma_axis));
+    table.last_index = index_axis(view.axis(table.last_axis));
+    table.exit_index = index_axis(view.axis(view.parameter_axes()));
+}
+
+MEDULLA_HOT AxisPoint sigma_point(const MaterialTable& table, float sigma) noexcept {
+    return axis_point(table.view, table.sigma_axis, table.sigma_index, sigma);
+}
+/// @param x h or theta_i
+MEDULLA_HOT AxisPoint last_point(const MaterialTable& table, float x) noexcept {
+    return axis_point(table.view, table.last_axis, table.last_index, x);
+}
+MEDULLA_HOT AxisPoint exit_point(const MaterialTable& table, float y) noexcept {
+    return axis_point(table.view, table.view.parameter_axes(), table.exit_index, y);
+}
+/// Density of the contracted lobe at y, >= 0, as lobe() of lookup.hpp.
+MEDULLA_FN float lobe(const MaterialTable& table, const Contraction& contraction, float y) noexcept {
+    const float value = signed_lobe(table.view, contraction, exit_point(table, y));
+    return value < 0 ? 0.0f : value;
 }
 
 /// The lobe that is left at (sigma, h or theta_i).
@@ -59,8 +79,7 @@ MEDULLA_FN void contract(const MaterialTable& table, const AxisPoint& sigma, con
     result.inverse_integral = inverse_integral(table.view, result.weight);
 }
 MEDULLA_FN void contract(const MaterialTable& table, float sigma, float last, Contraction& result) noexcept {
-    contract(table, axis_point(table.view, table.sigma_axis, sigma), axis_point(table.view, table.last_axis, last),
-             result);
+    contract(table, sigma_point(table, sigma), last_point(table, last), result);
 }
 
 /// Whether axis `i` of one table has the breakpoints of axis `k` of another: what is located once then serves both.
@@ -170,8 +189,8 @@ MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, 
         contract(fibre.forward, m.sigma, inclined, m.forward);
         return;
     }
-    const AxisPoint at_sigma = axis_point(fibre.back.view, fibre.back.sigma_axis, m.sigma);
-    const AxisPoint at_theta = axis_point(fibre.back.view, fibre.back.last_axis, inclined);
+    const AxisPoint at_sigma = sigma_point(fibre.back, m.sigma);
+    const AxisPoint at_theta = last_point(fibre.back, inclined);
     contract(fibre.back, at_sigma, at_theta, m.back);
     contract(fibre.forward, at_sigma, at_theta, m.forward);
 }
@@ -186,8 +205,8 @@ MEDULLA_FN void longitudinal_lobes(const FurFibre<Channels>& fibre, const Longit
     const float side = m.theta_i < 0 ? -theta_r : theta_r;
     const float t = std::abs(wrap_angle(phi)) * float(1 / pi);
     const TableView &back_view = fibre.back.view, &forward_view = fibre.forward.view;
-    const AxisPoint at_back = axis_point(back_view, back_view.parameter_axes(), side);
-    const AxisPoint at_forward = fibre.paired ? at_back : axis_point(forward_view, forward_view.parameter_axes(), side);
+    const AxisPoint at_back = exit_point(fibre.back, side);
+    const AxisPoint at_forward = fibre.paired ? at_back : exit_point(fibre.forward, side);
     const float back = signed_lobe(back_view, m.back, at_back);
     const float forward = signed_lobe(forward_view, m.forward, at_forward);
     lobes.M[3] = lobes.M[4] = (1 - t) * (back < 0 ? 0.0f : back) + t * (forward < 0 ? 0.0f : forward);
@@ -213,7 +232,7 @@ struct NearField {
         for (int p = 0; p < 3; ++p)
             for (int c = 0; c < Channels; ++c) result.N[p][c] = energy.A[p][c] * lane(D, p);
         for (int p = 3; scattered && p < 5; ++p) {
-            const float density = lobe(fibre->azimuthal.view, azimuthal, side * (phi - centre[p]));
+            const float density = lobe(fibre->azimuthal, azimuthal, side * (phi - centre[p]));
             for (int c = 0; c < Channels; ++c) result.N[p][c] = energy.A[p][c] * density;
         }
         return result;

@@ -164,6 +164,15 @@ MEDULLA_HOT AxisPoint axis_point(const TableView& table, std::uint32_t k, float 
     return {cell.span, spline_weights(axis, cell)};
 }
 
+/// The same with a starting point for the search.
+MEDULLA_HOT AxisPoint axis_point(const TableView& table, std::uint32_t k, const AxisIndex<float>& index,
+                                 float x) noexcept {
+    const AxisView<float> axis = table.axis(k);
+    const Cell<float> cell =
+        locate(axis, index, spline_coordinate(static_cast<Quantity>(table.layout.axes[k].quantity), x));
+    return {cell.span, spline_weights(axis, cell)};
+}
+
 /// to[r] = from[r] * (factor r of axis k at the point).
 MEDULLA_HOT void contract_axis(const TableView& table, std::uint32_t k, const AxisPoint& at, const float* from,
                                float* to) noexcept {

@@ -36,6 +36,7 @@ struct FurSample {
 namespace detail {
 
 MEDULLA_FN float solid_angle_density(float angular, float theta) noexcept {
+    if (!(angular > 0)) return 0;  // also where theta is no inclination at all
     const float cosine = std::cos(theta);
     return angular / (cosine > least_cosine ? cosine : least_cosine);
 }

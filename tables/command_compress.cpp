@@ -10,8 +10,10 @@ namespace medulla::tables {
 namespace {
 
 struct CompressWords {
-    std::string file, output, solver = "als";
+    std::string file, output, solver = "lm";
     int rank = 16;
+    double max_error = 0;
+    std::size_t max_bytes = 0;
     std::uint64_t seed = 1;
     bool json = false;
 };
@@ -36,6 +38,9 @@ void run_compress(const CompressWords& words) {
     CompressOptions options;
     options.rank = words.rank;
     options.seed = words.seed;
+    options.solver = words.solver == "als" ? tensor::Solver::als : tensor::Solver::lm;
+    if (words.max_error > 0) options.max_error = words.max_error;
+    if (words.max_bytes > 0) options.max_bytes = words.max_bytes;
     const std::string input = words.file.substr(words.file.rfind('/') + 1);
     const CompressResult result = compress(read_tables(words.file), options, input);
     write_file(output, result.pack.data(), result.pack.size());
@@ -108,8 +113,16 @@ void add_compress(CLI::App& app, Action& action) {
         [](CLI::App& command, CompressWords& words) {
             command.add_option("FILE", words.file, "tables file")->required();
             command.add_option("-o,--output", words.output, "pack to write (default: FILE with .furpack)");
-            command.add_option("--rank", words.rank, "components of each table")
+            auto* size = command.add_option_group("size")->require_option(0, 1);
+            size->add_option("--rank", words.rank, "components of each table")
                 ->check(CLI::Range(1, static_cast<int>(max_rank)))
+                ->capture_default_str();
+            size->add_option("--max-error", words.max_error, "smallest pack whose factors keep this relative L2")
+                ->check(CLI::PositiveNumber);
+            size->add_option("--max-bytes", words.max_bytes, "least error within this many bytes")
+                ->check(CLI::PositiveNumber);
+            command.add_option("--solver", words.solver, "alternating least squares or Levenberg-Marquardt")
+                ->check(CLI::IsMember({"als", "lm"}))
                 ->capture_default_str();
             command.add_option("--seed", words.seed, "of the solver's start")->capture_default_str();
             command.add_flag("--json", words.json, "print one JSON object");

@@ -46,7 +46,8 @@ std::vector<std::size_t> parameter_shape(const Table& table) {
     return shape;
 }
 
-PackedTable compress_lobes(const Table& table, TableKind kind, const CompressOptions& options, TableReport& report) {
+PackedTable compress_lobes(const Table& table, TableKind kind, int rank, const CompressOptions& options,
+                           TableReport& report) {
     const std::size_t side = kind == TableKind::longitudinal_forward ? 1 : 0, bins = table.bins();
     const std::vector<double> lobes = side_lobes(table, side);
     const bool periodic = kind == TableKind::azimuthal;
@@ -67,7 +68,7 @@ PackedTable compress_lobes(const Table& table, TableKind kind, const CompressOpt
     Eigen::Map<RowMajor>(reduced.values.data(), cells, k) = values * q;
 
     tensor::CpOptions solve;
-    solve.rank = options.rank;
+    solve.rank = rank;
     solve.seed = options.seed;
     const tensor::CpResult result = tensor::cp(reduced, options.solver, solve);
     const double whole = values.norm(), inside = Eigen::Map<const RowMajor>(reduced.values.data(), cells, k).norm();
@@ -116,10 +117,10 @@ tensor::Tensor back_fractions(const Table& table) {
     return fraction;
 }
 
-PackedTable compress_fractions(const Table& table, const CompressOptions& options, TableReport& report) {
+PackedTable compress_fractions(const Table& table, int rank, const CompressOptions& options, TableReport& report) {
     const tensor::Tensor fraction = back_fractions(table);
     tensor::CpOptions solve;
-    solve.rank = std::min(options.rank, 16);
+    solve.rank = std::min(rank, 16);  // three small axes: more rank is only rounding
     solve.seed = options.seed;
     const tensor::CpResult result = tensor::cp(fraction, options.solver, solve);
     report.kind = TableKind::back_fraction;
@@ -181,21 +182,94 @@ std::vector<double> exit_breakpoints(const std::string& exit, std::size_t bins, 
     return points;
 }
 
+namespace {
+
+constexpr int greatest_rank = static_cast<int>(max_rank);
+constexpr int rank_step = static_cast<int>(rank_multiple);
+/// Room kept for the provenance text when a pack must fit into a number of bytes.
+constexpr std::size_t text_room = 2048;
+
+PackedTable compress_table(const Table& table, TableKind kind, int rank, const CompressOptions& options,
+                           TableReport& report) {
+    return kind == TableKind::back_fraction ? compress_fractions(table, rank, options, report)
+                                            : compress_lobes(table, kind, rank, options, report);
+}
+
+std::vector<std::pair<TableKind, const Table*>> kinds_of(const Tables& tables) {
+    std::vector<std::pair<TableKind, const Table*>> kinds;
+    if (tables.azimuthal) kinds.emplace_back(TableKind::azimuthal, &*tables.azimuthal);
+    if (tables.longitudinal)
+        for (const TableKind kind :
+             {TableKind::longitudinal_back, TableKind::longitudinal_forward, TableKind::back_fraction})
+            kinds.emplace_back(kind, &*tables.longitudinal);
+    return kinds;
+}
+
+/// Bytes of a pack with one rank for all tables: laid out with factors of zeros.
+std::size_t pack_bytes(const Tables& tables, int rank, const CompressOptions& options) {
+    std::vector<PackedTable> empty;
+    for (const auto& [kind, table] : kinds_of(tables)) {
+        const int own = kind == TableKind::back_fraction ? std::min(rank, 16) : rank;
+        tensor::CpModel model;
+        model.weights = Eigen::VectorXd::Zero(own);
+        for (const std::size_t n : parameter_shape(*table))
+            model.factors.push_back(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), own));
+        PackedTable packed{kind, parameter_splines(*table, model), model.weights, 0, 0};
+        if (kind != TableKind::back_fraction) {
+            const bool periodic = kind == TableKind::azimuthal;
+            const Spline exit(
+                exit_breakpoints(exit_name(kind), table->bins(), periodic ? options.phi_spans : options.theta_spans),
+                periodic);
+            packed.axes.push_back({quantity_of(exit_name(kind)), static_cast<std::uint32_t>(table->bins()), exit,
+                                   Eigen::MatrixXd::Zero(exit.size(), own)});
+        }
+        empty.push_back(std::move(packed));
+    }
+    return write_pack(empty, std::string(text_room, ' ')).size();
+}
+
+int rank_within(const Tables& tables, std::size_t bytes, const CompressOptions& options) {
+    int rank = greatest_rank;
+    while (rank > rank_step && pack_bytes(tables, rank, options) > bytes) rank -= rank_step;
+    if (const std::size_t least = pack_bytes(tables, rank, options); least > bytes)
+        throw Error("--max-bytes: expected at least {} for these tables, found {}", least, bytes);
+    return rank;
+}
+
+/// Least rank on the steps of the format whose factors keep the error; bisection, since the error falls with the rank.
+PackedTable compress_to(const Table& table, TableKind kind, double error, const CompressOptions& options,
+                        TableReport& report) {
+    PackedTable best = compress_table(table, kind, greatest_rank, options, report);
+    if (report.fit_error > error)
+        throw Error("--max-error: rank {} of the {} leaves {:.2e}, expected {:.2e}", greatest_rank, name_of(kind),
+                    report.fit_error, error);
+    int low = 0, high = greatest_rank / rank_step;
+    while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        TableReport tried;
+        PackedTable packed = compress_table(table, kind, middle * rank_step, options, tried);
+        if (tried.fit_error > error)
+            low = middle;
+        else
+            high = middle, best = std::move(packed), report = tried;
+    }
+    return best;
+}
+
+}  // namespace
+
 CompressResult compress(const Tables& tables, const CompressOptions& options, const std::string& input) {
     const auto start = std::chrono::steady_clock::now();
     CompressResult result;
     std::vector<PackedTable> packed;
-    const auto add = [&](TableKind kind, const Table& table) {
+    const int rank = options.max_bytes ? rank_within(tables, *options.max_bytes, options) : options.rank;
+    for (const auto& [kind, table] : kinds_of(tables)) {
         TableReport report;
-        packed.push_back(kind == TableKind::back_fraction ? compress_fractions(table, options, report)
-                                                          : compress_lobes(table, kind, options, report));
+        const bool searched = options.max_error && kind != TableKind::back_fraction;
+        packed.push_back(searched ? compress_to(*table, kind, *options.max_error, options, report)
+                                  : compress_table(*table, kind, options.max_error ? 16 : rank, options, report));
         result.tables.push_back(report);
-    };
-    if (tables.azimuthal) add(TableKind::azimuthal, *tables.azimuthal);
-    if (tables.longitudinal)
-        for (const TableKind kind :
-             {TableKind::longitudinal_back, TableKind::longitudinal_forward, TableKind::back_fraction})
-            add(kind, *tables.longitudinal);
+    }
     result.pack = write_pack(packed, provenance(tables, options, input, result.tables));
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     result.errors = compare(*table_source(tables), *pack_source(result.pack, "the new pack"));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,10 @@
 namespace medulla::tables {
 
 struct CompressOptions {
-    int rank = 16;
-    std::size_t phi_spans = 128, theta_spans = 96;  ///< exit spline of the azimuthal and longitudinal lobes
+    int rank = 16;                         ///< components of each table
+    std::optional<double> max_error;       ///< instead: the smallest pack whose every table keeps this relative L2
+    std::optional<std::size_t> max_bytes;  ///< instead: the least error within this many bytes
+    std::size_t phi_spans = 128, theta_spans = 128;  ///< exit spline of the azimuthal and longitudinal lobes
     tensor::Solver solver = tensor::Solver::lm;
     std::uint64_t seed = 1;
 };
@@ -34,7 +37,8 @@ struct CompressResult {
     double seconds = 0;             ///< without reading or writing files
 };
 
-/// Compresses every lobe kind of `tables`. `input` is named in the pack's provenance.
+/// Compresses every lobe kind of `tables`. `input` is named in the pack's provenance. Throws Error where max_error or
+/// max_bytes cannot be met.
 CompressResult compress(const Tables& tables, const CompressOptions& options, const std::string& input);
 
 /// Breakpoints of an exit spline on bin edges: dense where lobes are sharp (phi: at 0 and, less, at +-pi).

@@ -47,18 +47,18 @@ std::string draw(const Panel& panel, double x0, double y0) {
     out += text(x0 + left + w / 2, y0 + height - 6, panel.x_label, "middle", 10);
     out += fmt::format("<rect x='{:.1f}' y='{:.1f}' width='{:.1f}' height='{:.1f}' fill='none' stroke='#999'/>\n",
                        x0 + left, y0 + top, w, h);
-    double legend = y0 + top + 13;
+    double legend = y0 + top + h - 12 * static_cast<double>(panel.curves.size()) + 8;
     for (const Curve& curve : panel.curves) {
         out +=
             fmt::format("<polyline fill='none' stroke='{}' stroke-width='{}' {}points='", curve.colour,
                         curve.dashed ? 1.1 : 1.8, curve.dashed ? "stroke-dasharray='5 3' " : "stroke-opacity='0.55' ");
         for (std::size_t i = 0; i < curve.x.size(); ++i) {
             const double log_y = curve.y[i] > 0 ? std::log10(curve.y[i]) : log_bottom;
-            out += fmt::format("{:.2f},{:.2f} ", px(curve.x[i]), py(std::max(log_y, log_bottom)));
+            out += fmt::format("{:.1f},{:.1f} ", px(curve.x[i]), py(std::max(log_y, log_bottom)));
         }
         out += "'/>\n";
         if (curve.label.empty()) continue;
-        out += text(x0 + left + 6, legend, curve.label, "start", 10, curve.colour.c_str());
+        out += text(x0 + left + w / 2, legend, curve.label, "middle", 10, curve.colour.c_str());
         legend += 12;
     }
     return out;

@@ -13,7 +13,8 @@ struct Profile {
     double energy = 0;          ///< scattered energy per unit incident energy, in [0, 1]
     double energy_error = 0;    ///< standard error of `energy` (0 where it is a closed form)
     double standard_error = 0;  ///< relative L2 error of `lobe`: |error| / |lobe| over the bins
-    double mean_length = 0;     ///< mean path length inside the medium of the scattered light [radii]; infinite in an empty slab
+    double mean_length =
+        0;  ///< mean path length inside the medium of the scattered light [radii]; infinite in an empty slab
 };
 
 /// Both exit lobes of one (sigma, g, theta_i), each normalised to integral 1 over theta_r in (-pi/2, pi/2).

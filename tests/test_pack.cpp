@@ -83,6 +83,8 @@ TEST_CASE("A pack's lobes are the factors' lobes, and integrate to 1", "[pack]")
             CHECK(azimuthal(opened.pack, sigma, g, -0.4f, 1.0f) == azimuthal(opened.pack, sigma, g, 0.4f, -1.0f));
         }
     CHECK(azimuthal(opened.pack, 0, 0.2f, 0.1f, 0.3f) == 0);
+    CHECK(std::isnan(longitudinal(opened.pack, Side::back, 1, 0.2f, 0.1f, 0.3f)));  // no such table
+    CHECK(std::isnan(azimuthal(PackView{}, 1, 0.2f, 0.1f, 0.3f)));
     CHECK(std::isnan(azimuthal(opened.pack, 1, std::nanf(""), 0.1f, 0.3f)));
 }
 

@@ -13,7 +13,8 @@ int main() {
     const float g = 0.4f;      // anisotropy
     const float h = 0.5f;      // where the light enters, in medulla radii
 
-    std::printf("C^N(phi; sigma = %g, g = %g, h = %g), energy %.4f\n", sigma, g, h, medulla::azimuthal_energy(sigma, h));
+    std::printf("C^N(phi; sigma = %g, g = %g, h = %g), energy %.4f\n", sigma, g, h,
+                medulla::azimuthal_energy(sigma, h));
     // The parameters are contracted once, then any number of directions is read.
     const medulla::TableView& table = opened.pack[medulla::TableKind::azimuthal];
     medulla::LobeQuery query;

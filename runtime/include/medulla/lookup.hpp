@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "medulla/lanes.hpp"
 #include "medulla/pack.hpp"
@@ -252,9 +253,11 @@ MEDULLA_FN T longitudinal_energy(T sigma, T theta_i) noexcept {
 }
 
 /// C^N(phi; sigma, g, h) [1/radian], scattered light only; h in [-1, 1], phi = 0 forward. A `sigma` of 0 gives 0.
+/// NaN where the pack has no azimuthal table.
 MEDULLA_FN float azimuthal(const PackView& pack, float sigma, float g, float h, float phi,
                            float absorption = 0) noexcept {
     const TableView& table = pack[TableKind::azimuthal];
+    if (!table) return std::numeric_limits<float>::quiet_NaN();
     const float side = h < 0 ? -1.0f : 1.0f;
     LobeQuery query;
     query.sigma = sigma, query.g = g, query.h = side * h, query.absorption = absorption;
@@ -264,9 +267,11 @@ MEDULLA_FN float azimuthal(const PackView& pack, float sigma, float g, float h, 
 enum class Side { back, forward };
 
 /// C^M(theta_r; sigma, g, theta_i) of one side, normalised over theta_r in (-pi/2, pi/2) [1/radian].
+/// NaN where the pack has no such table.
 MEDULLA_FN float longitudinal(const PackView& pack, Side which, float sigma, float g, float theta_i,
                               float theta_r) noexcept {
     const TableView& table = pack[which == Side::back ? TableKind::longitudinal_back : TableKind::longitudinal_forward];
+    if (!table) return std::numeric_limits<float>::quiet_NaN();
     const float side = theta_i < 0 ? -1.0f : 1.0f;
     LobeQuery query;
     query.sigma = sigma, query.g = g, query.theta_i = side * theta_i;

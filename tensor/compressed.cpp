@@ -64,9 +64,9 @@ CpResult solve_compressed(const Tensor& tensor, const CpOptions& options, const 
         double truncation = options.truncation.value_or(recipe.truncation);
         auto level = std::make_unique<Level>(truncated_hosvd(input.tensor(), truncation));
         Fit fit = recipe.first(*level, report);
-        // At an eighth of the error the truncation adds 1/128 to it.
+        // At a fifth of the error the truncation adds a fiftieth to it.
         while (!options.truncation && truncation > finest_truncation &&
-               level->total_error(fit, input.norm()) < 8 * truncation) {
+               level->total_error(fit, input.norm()) < 5 * truncation) {
             truncation = std::max(finest_truncation, truncation / 30);
             auto finer = std::make_unique<Level>(truncated_hosvd(input.tensor(), truncation));
             const int before = fit.iterations;
@@ -120,7 +120,7 @@ CpResult cp_als_compressed(const Tensor& tensor, const CpOptions& options) {
 
 CpResult cp_lm(const Tensor& tensor, const CpOptions& options) {
     const double tolerance = options.tolerance.value_or(1e-3);
-    const int steps = options.max_sweeps.value_or(200);
+    const int steps = options.max_sweeps.value_or(100);
     const auto solve = [&](const Level& level, Factors start, double ridge) {
         return lm_steps(level.split, 1 / level.norm, std::move(start), ridge, steps, tolerance);
     };
@@ -129,7 +129,7 @@ CpResult cp_lm(const Tensor& tensor, const CpOptions& options) {
     recipe.first = [&](const Level& level, CpReport& report) {
         const double ridge = options.ridge.value_or(options.rank < 32 ? 1e-5 : 1e-6);
         Fit best;
-        for (int start = 0; start < options.restarts.value_or(options.rank <= 32 ? 4 : 1); ++start) {
+        for (int start = 0; start < options.restarts.value_or(options.rank <= 32 ? 3 : 1); ++start) {
             Factors factors = gaussian_factors(level.hosvd.core.shape, options.rank, options.seed, start);
             // Columns about as long as those of `rank` equal orthogonal components that make up the tensor.
             for (RowMatrix& f : factors)
@@ -145,7 +145,7 @@ CpResult cp_lm(const Tensor& tensor, const CpOptions& options) {
         // A fit this good is worth a smaller ridge, as long as components do not begin to cancel.
         double ridge = before.ridge;
         Fit fit = solve(level, std::move(start), ridge);
-        while (!options.ridge && ridge > 0 && fit.stop != Stop::exact) {
+        while (!options.ridge && ridge > 0 && fit.stop == Stop::converged) {
             ridge = ridge > 1e-15 ? ridge / 100 : 0;
             Fit next = solve(level, balanced(fit), ridge);
             if (next.weights.sum() > 10 || next.error > 0.98 * fit.error) break;

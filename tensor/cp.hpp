@@ -79,7 +79,7 @@ struct CpResult {
 
 struct CpOptions {
     int rank = 16;                    ///< number of components, >= 1; may exceed every dimension
-    std::optional<int> max_sweeps;    ///< ALS sweeps or LM steps per start, >= 1; unset: ALS 500, LM 200
+    std::optional<int> max_sweeps;    ///< ALS sweeps or LM steps per start, >= 1; unset: ALS 500, LM 100
     std::optional<double> tolerance;  ///< see Stop::converged; 0 never fires; unset: ALS 1e-6, LM 1e-3
     std::uint64_t seed = 1;           ///< same seed, same bytes, for any number of threads
     /// Complete solves from different Gaussian starts, >= 1; the least error is kept. Unset: ALS 1, LM 4 up to rank 32

@@ -24,6 +24,7 @@ struct ModeView {
 
 constexpr Index block_length = 2048;  // 16 nodes of it fill 256 KB; fixed, since it fixes the order of sums
 
+/// The lower triangle, which is all that eigenvectors need.
 Eigen::MatrixXd gram(const Tensor& tensor, std::size_t mode) {
     const ModeView view(tensor.shape, mode);
     // Partial sums by fixed share of the work, added in order.
@@ -38,14 +39,14 @@ Eigen::MatrixXd gram(const Tensor& tensor, std::size_t mode) {
             if (view.inner == 1) {
                 const Index from = block * block_length, count = std::min(block_length, view.outer - from);
                 const Eigen::Map<const RowMatrix> rows(tensor.values.data() + from * view.nodes, count, view.nodes);
-                sum.noalias() += rows.transpose() * rows;
+                sum.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
             } else {
                 const Index per_outer = (view.inner + block_length - 1) / block_length;
                 const Index o = block / per_outer, from = block % per_outer * block_length;
                 const Eigen::Map<const RowMatrix> slab(tensor.values.data() + o * view.nodes * view.inner, view.nodes,
                                                        view.inner);
                 const auto columns = slab.middleCols(from, std::min(block_length, view.inner - from));
-                sum.noalias() += columns * columns.transpose();
+                sum.selfadjointView<Eigen::Lower>().rankUpdate(columns);
             }
         }
     }

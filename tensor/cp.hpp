@@ -87,7 +87,9 @@ struct CpOptions {
     /// 1 beyond.
     std::optional<int> restarts;
     /// Penalty ridge * sum |factor|^2 on balanced factors of the unit-norm tensor (half of it beside half the squared
-    /// error): what keeps components from cancelling. Unset: each solver's own (ALS 0, LM 1e-5 below rank 32, 1e-6 on).
+    /// error): what keeps components from cancelling.
+    /// Unset: ALS 0; LM starts from 1e-5 below rank 32 and 1e-6 on, raises it where components cancel, and lowers it
+    /// where the fit is so good that a finer core was needed. CpReport::ridge says where it ended.
     std::optional<double> ridge;
     /// Relative error of the HOSVD beneath the compressed solvers. Unset: each solver's own.
     std::optional<double> truncation;

@@ -79,7 +79,7 @@ struct CpResult {
 
 struct CpOptions {
     int rank = 16;                    ///< number of components, >= 1; may exceed every dimension
-    std::optional<int> max_sweeps;    ///< ALS sweeps or LM steps per start, >= 1; unset: ALS 500, LM 200
+    std::optional<int> max_sweeps;    ///< ALS sweeps or LM steps per start, >= 1; unset: ALS 500, LM 100
     std::optional<double> tolerance;  ///< see Stop::converged; 0 never fires; unset: ALS 1e-6, LM 1e-3
     std::uint64_t seed = 1;           ///< same seed, same bytes, for any number of threads
     /// Complete solves from different Gaussian starts, >= 1; the least error is kept. Unset: ALS 1, LM 4 up to rank 32
@@ -87,7 +87,9 @@ struct CpOptions {
     /// 1 beyond.
     std::optional<int> restarts;
     /// Penalty ridge * sum |factor|^2 on balanced factors of the unit-norm tensor (half of it beside half the squared
-    /// error): what keeps components from cancelling. Unset: each solver's own (ALS 0, LM 1e-5 below rank 32, 1e-6 on).
+    /// error): what keeps components from cancelling.
+    /// Unset: ALS 0; LM starts from 1e-5 below rank 32 and 1e-6 on, raises it where components cancel, and lowers it
+    /// where the fit is so good that a finer core was needed. CpReport::ridge says where it ended.
     std::optional<double> ridge;
     /// Relative error of the HOSVD beneath the compressed solvers. Unset: each solver's own.
     std::optional<double> truncation;

@@ -24,6 +24,7 @@ struct ModeView {
 
 constexpr Index block_length = 2048;  // 16 nodes of it fill 256 KB; fixed, since it fixes the order of sums
 
+/// The lower triangle, which is all that eigenvectors need.
 Eigen::MatrixXd gram(const Tensor& tensor, std::size_t mode) {
     const ModeView view(tensor.shape, mode);
     // Partial sums by fixed share of the work, added in order.
@@ -31,21 +32,21 @@ Eigen::MatrixXd gram(const Tensor& tensor, std::size_t mode) {
                                          : view.outer * ((view.inner + block_length - 1) / block_length);
     const Index shares = std::min<Index>(16, blocks);
     std::vector<Eigen::MatrixXd> sums(static_cast<std::size_t>(shares), Eigen::MatrixXd::Zero(view.nodes, view.nodes));
-#pragma omp parallel for schedule(dynamic) if (shares > 1)
+#pragma omp parallel for schedule(dynamic) if (shares > 1 && tensor.size() > (1u << 18))
     for (Index share = 0; share < shares; ++share) {
         Eigen::MatrixXd& sum = sums[static_cast<std::size_t>(share)];
         for (Index block = share * blocks / shares; block < (share + 1) * blocks / shares; ++block) {
             if (view.inner == 1) {
                 const Index from = block * block_length, count = std::min(block_length, view.outer - from);
                 const Eigen::Map<const RowMatrix> rows(tensor.values.data() + from * view.nodes, count, view.nodes);
-                sum.noalias() += rows.transpose() * rows;
+                sum.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
             } else {
                 const Index per_outer = (view.inner + block_length - 1) / block_length;
                 const Index o = block / per_outer, from = block % per_outer * block_length;
                 const Eigen::Map<const RowMatrix> slab(tensor.values.data() + o * view.nodes * view.inner, view.nodes,
                                                        view.inner);
                 const auto columns = slab.middleCols(from, std::min(block_length, view.inner - from));
-                sum.noalias() += columns * columns.transpose();
+                sum.selfadjointView<Eigen::Lower>().rankUpdate(columns);
             }
         }
     }
@@ -119,7 +120,7 @@ Tensor multiply(const Tensor& tensor, const Eigen::MatrixXd& matrix, std::size_t
     Tensor result(shape);
     if (view.inner == 1) {
         const Index chunks = (view.outer + block_length - 1) / block_length;
-#pragma omp parallel for schedule(static) if (chunks > 1)
+#pragma omp parallel for schedule(static) if (tensor.size() > (1u << 18))
         for (Index chunk = 0; chunk < chunks; ++chunk) {
             const Index from = chunk * block_length, count = std::min(block_length, view.outer - from);
             const Eigen::Map<const RowMatrix> rows(tensor.values.data() + from * view.nodes, count, view.nodes);
@@ -129,7 +130,7 @@ Tensor multiply(const Tensor& tensor, const Eigen::MatrixXd& matrix, std::size_t
         return result;
     }
     const Index per_outer = (view.inner + block_length - 1) / block_length;
-#pragma omp parallel for schedule(static) if (view.outer * per_outer > 1)
+#pragma omp parallel for schedule(static) if (tensor.size() > (1u << 18))
     for (Index block = 0; block < view.outer * per_outer; ++block) {
         const Index o = block / per_outer, from = block % per_outer * block_length;
         const Index count = std::min(block_length, view.inner - from);

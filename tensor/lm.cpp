@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 
 namespace medulla::tensor {
@@ -13,6 +12,11 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+
+// Inexact Newton: loose solves of many systems beat tight solves of few. On the stand-in table of bench/ at ranks 16
+// and 128 a tenth of the residual and 20 iterations reach the error of 1e-3 and 300 in a fifth of the time.
+constexpr double residual_kept = 0.1;
+constexpr int most_iterations = 20;
 
 double dot(const RowMatrix& a, const RowMatrix& b) { return (a.array() * b.array()).sum(); }
 double squared_norm(const Factors& factors) {
@@ -101,7 +105,7 @@ class NormalEquations {
     const Factors& gradient() const { return gradient_; }
 
     /// The step for a shift (ridge + damping) of the diagonal; `residual_dot_step` is what conjugate gradients left.
-    Factors step(double shift, double relative_residual, int most, double& residual_dot_step) {
+    Factors step(double shift, double& residual_dot_step) {
         shift_ = shift;
         inverse_.resize(order_);
         const MatrixXd identity = MatrixXd::Identity(rank_, rank_);
@@ -118,7 +122,7 @@ class NormalEquations {
         precondition(r, z);
         p = z;
         double rz = product(r, z), first = product(r, r);
-        for (int k = 0; k < most && first > 0; ++k) {
+        for (int k = 0; k < most_iterations && first > 0; ++k) {
             apply(p, image);
             const double curvature = product(p, image);
             if (!(curvature > 0)) break;  // rounding: the matrix is positive definite
@@ -128,7 +132,7 @@ class NormalEquations {
                     d[n] += a * p[n];
                     r[n] -= a * image[n];
                 }
-            if (product(r, r) <= relative_residual * relative_residual * first) break;
+            if (product(r, r) <= residual_kept * residual_kept * first) break;
             precondition(r, z);
             const double next = product(r, z);
             const double b = next / rz;
@@ -169,8 +173,14 @@ class NormalEquations {
             inner_[n].noalias() = p[n].transpose() * u_[n];
             coupling_.array() += inner_[n].array() * pair(n, last).array();
         }
-        half_.noalias() = inverse_[last] * coupling_.transpose();
-        through_.noalias() = half_ * grams_[last];
+        if (3 * u_[last].rows() < 2 * rank_) {  // fewer multiplications through the factor than through its Gram
+            thin_.noalias() = u_[last] * coupling_;
+            thin_image_.noalias() = thin_ * inverse_[last];
+            through_.noalias() = thin_image_.transpose() * u_[last];
+        } else {
+            half_.noalias() = inverse_[last] * coupling_.transpose();
+            through_.noalias() = half_ * grams_[last];
+        }
         for (std::size_t n = 0; n < order_; ++n) {
             if (n == last) continue;
             sum_ = -(through_.array() * pair(n, last).array()).matrix();
@@ -188,6 +198,7 @@ class NormalEquations {
     double shift_ = 0;
     std::vector<MatrixXd> grams_, pairs_, inverse_, inner_;
     MatrixXd coupling_, half_, through_, sum_;
+    RowMatrix thin_, thin_image_;
     Factors gradient_;
 };
 
@@ -201,7 +212,7 @@ Fit lm_steps(const SplitTensor& tensor, double scale, Factors start, double ridg
     objective.balance(point);
     Fit fit;
     fit.ridge = ridge;
-    double damping = getenv("MU") ? atof(getenv("MU")) : 1e-2, growth = 2;
+    double damping = 1e-2, growth = 2;
     bool moved = true;
     std::vector<NormalEquations> equations;
     fit.stop = Stop::sweeps;
@@ -212,8 +223,7 @@ Fit lm_steps(const SplitTensor& tensor, double scale, Factors start, double ridg
             equations.emplace_back(point, ridge);
         }
         double residual_dot_step = 0;
-        const Factors d = equations[0].step(ridge + damping, getenv("CGT") ? atof(getenv("CGT")) : 1e-1,
-                                            getenv("CGN") ? atoi(getenv("CGN")) : 50, residual_dot_step);
+        const Factors d = equations[0].step(ridge + damping, residual_dot_step);
         Factors moved_factors(order);
         double slope = 0, length = 0;
         for (std::size_t k = 0; k < order; ++k) {

@@ -13,6 +13,9 @@ namespace {
 constexpr Eigen::Index outputs_per_chunk = 64;
 constexpr Eigen::Index terms_per_block = 256;
 
+// Waking a team costs some 10 us, and far more where cores are shared: a few milliseconds of work must wait for it.
+bool worth_threads(Eigen::Index cells, Eigen::Index rank) { return cells * rank > (Eigen::Index{1} << 23); }
+
 }  // namespace
 
 void khatri_rao_rows(const Factors& factors, std::size_t first, std::size_t last, Eigen::Index begin,
@@ -62,7 +65,7 @@ RowMatrix SplitTensor::down(const Factors& factors, double scale) const {
     const Eigen::Map<const RowMatrix> tensor(values_, rows_, columns_);
     RowMatrix result = RowMatrix::Zero(rows_, factors[0].cols());
     const Eigen::Index chunks = (rows_ + outputs_per_chunk - 1) / outputs_per_chunk;
-#pragma omp parallel for schedule(dynamic) if (chunks > 1)
+#pragma omp parallel for schedule(dynamic) if (worth_threads(rows_ * columns_, result.cols()))
     for (Eigen::Index chunk = 0; chunk < chunks; ++chunk) {
         const Eigen::Index row = chunk * outputs_per_chunk, count = std::min(outputs_per_chunk, rows_ - row);
         RowMatrix terms;
@@ -81,7 +84,7 @@ RowMatrix SplitTensor::across(const Factors& factors, double scale) const {
     RowMatrix result = RowMatrix::Zero(columns_, factors[0].cols());
     const Eigen::Index per_chunk = 4 * outputs_per_chunk;  // read along the tensor's rows: longer runs
     const Eigen::Index chunks = (columns_ + per_chunk - 1) / per_chunk;
-#pragma omp parallel for schedule(dynamic) if (chunks > 1)
+#pragma omp parallel for schedule(dynamic) if (worth_threads(rows_ * columns_, result.cols()))
     for (Eigen::Index chunk = 0; chunk < chunks; ++chunk) {
         const Eigen::Index column = chunk * per_chunk, count = std::min(per_chunk, columns_ - column);
         RowMatrix terms;
@@ -119,7 +122,7 @@ double SplitTensor::residual_squared(const Factors& factors, const Eigen::Vector
     const Eigen::Map<const RowMatrix> tensor(values_, rows_, columns_);
     const Eigen::Index chunks = (rows_ + outputs_per_chunk - 1) / outputs_per_chunk;
     std::vector<double> sums(static_cast<std::size_t>(chunks), 0.0);
-#pragma omp parallel for schedule(dynamic) if (chunks > 1)
+#pragma omp parallel for schedule(dynamic) if (worth_threads(rows_ * columns_, weights.size()))
     for (Eigen::Index chunk = 0; chunk < chunks; ++chunk) {
         const Eigen::Index row = chunk * outputs_per_chunk, count = std::min(outputs_per_chunk, rows_ - row);
         RowMatrix left, right, model;

@@ -10,7 +10,8 @@ namespace medulla::tables {
 namespace {
 
 struct CompressWords {
-    std::string file, output, solver = "lm";
+    std::vector<std::string> files;
+    std::string output, solver = "lm";
     int rank = 16;
     double max_error = 0;
     std::size_t max_bytes = 0;
@@ -32,17 +33,37 @@ nlohmann::ordered_json to_json(const TableReport& report) {
             {"norm_ratio", solve.degeneracy.norm_ratio}};
 }
 
+/// The tables of one file, or of two that hold one kind each (on axes of their own).
+Tables read_all(const std::vector<std::string>& files) {
+    Tables all = read_tables(files[0]);
+    for (std::size_t i = 1; i < files.size(); ++i) {
+        Tables more = read_tables(files[i]);
+        for (const auto& [mine, other] :
+             {std::pair(&all.azimuthal, &more.azimuthal), std::pair(&all.longitudinal, &more.longitudinal)}) {
+            if (!*other) continue;
+            if (*mine)
+                throw Error("{}: expected another table than {}, found /{} in both", files[i], files[0],
+                            (*other)->name);
+            *mine = std::move(*other);
+        }
+    }
+    return all;
+}
+
+std::string file_name(const std::string& path) { return path.substr(path.rfind('/') + 1); }
+
 void run_compress(const CompressWords& words) {
-    const std::string output =
-        words.output.empty() ? words.file.substr(0, words.file.rfind(".h5")) + ".furpack" : words.output;
+    const std::string& first = words.files[0];
+    const std::string output = words.output.empty() ? first.substr(0, first.rfind(".h5")) + ".furpack" : words.output;
     CompressOptions options;
     options.rank = words.rank;
     options.seed = words.seed;
     options.solver = words.solver == "als" ? tensor::Solver::als : tensor::Solver::lm;
     if (words.max_error > 0) options.max_error = words.max_error;
     if (words.max_bytes > 0) options.max_bytes = words.max_bytes;
-    const std::string input = words.file.substr(words.file.rfind('/') + 1);
-    const CompressResult result = compress(read_tables(words.file), options, input);
+    std::string input;
+    for (const std::string& file : words.files) input += (input.empty() ? "" : ", ") + file_name(file);
+    const CompressResult result = compress(read_all(words.files), options, input);
     write_file(output, result.pack.data(), result.pack.size());
     if (words.json) {
         nlohmann::ordered_json json = {{"output", output}, {"bytes", result.pack.size()}, {"seconds", result.seconds}};
@@ -111,7 +132,9 @@ void add_compress(CLI::App& app, Action& action) {
     add_command<CompressWords>(
         app, action, "compress", "tables.h5 -> low-rank pack",
         [](CLI::App& command, CompressWords& words) {
-            command.add_option("FILE", words.file, "tables file")->required();
+            command.add_option("FILE", words.files, "tables file, or two with one table each")
+                ->required()
+                ->expected(1, 2);
             command.add_option("-o,--output", words.output, "pack to write (default: FILE with .furpack)");
             auto* size = command.add_option_group("size")->require_option(0, 1);
             size->add_option("--rank", words.rank, "components of each table")

@@ -1,0 +1,474 @@
+// Included once per instruction set by tracer_kernel.cpp: the tracer's arithmetic over lanes of floats.
+#if defined(MEDULLA_TRACER_LANES_INL) == defined(HWY_TARGET_TOGGLE)
+#ifdef MEDULLA_TRACER_LANES_INL
+#undef MEDULLA_TRACER_LANES_INL
+#else
+#define MEDULLA_TRACER_LANES_INL
+#endif
+
+#include <cstddef>
+#include <cstdint>
+
+#include "hwy/contrib/math/math-inl.h"
+#include "hwy/highway.h"
+#include "sim2d/tracer_state.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace medulla::sim2d {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using F = hn::ScalableTag<float>;
+using I = hn::RebindToSigned<F>;
+using U = hn::RebindToUnsigned<F>;
+using VF = hn::Vec<F>;
+using VI = hn::Vec<I>;
+using VU = hn::Vec<U>;
+using MF = hn::Mask<F>;
+
+constexpr float kPiF = 3.14159265f;
+
+HWY_INLINE VF Constant(float x) { return hn::Set(F(), x); }
+
+/// Low and high halves of 32 x 32 bit products.
+HWY_INLINE void Multiply(VU a, std::uint32_t factor, VU& low, VU& high) {
+#if HWY_TARGET == HWY_SCALAR
+    const std::uint64_t product = std::uint64_t{hn::GetLane(a)} * factor;
+    low = hn::Set(U(), static_cast<std::uint32_t>(product));
+    high = hn::Set(U(), static_cast<std::uint32_t>(product >> 32));
+#else
+    const hn::RepartitionToWide<U> wide;
+    const VU b = hn::Set(U(), factor);
+    const auto even = hn::MulEven(a, b);
+    const auto odd = hn::MulEven(hn::BitCast(U(), hn::ShiftRight<32>(hn::BitCast(wide, a))), b);
+    low = hn::OddEven(hn::BitCast(U(), hn::ShiftLeft<32>(odd)), hn::BitCast(U(), even));
+    high = hn::OddEven(hn::BitCast(U(), odd), hn::BitCast(U(), hn::ShiftRight<32>(even)));
+#endif
+}
+
+/// Philox4x32-10 over lanes of counters; the scalar twin is in random.hpp.
+struct Words4 {
+    VU a, b, c, d;
+};
+HWY_INLINE Words4 Philox(Words4 w, std::uint32_t k0, std::uint32_t k1) {
+    for (int round = 0; round < 10; ++round) {
+        VU al, ah, bl, bh;
+        Multiply(w.a, 0xD2511F53u, al, ah);
+        Multiply(w.c, 0xCD9E8D57u, bl, bh);
+        w = {hn::Xor(hn::Xor(bh, w.b), hn::Set(U(), k0)), bl, hn::Xor(hn::Xor(ah, w.d), hn::Set(U(), k1)), al};
+        k0 += 0x9E3779B9u, k1 += 0xBB67AE85u;
+    }
+    return w;
+}
+HWY_INLINE Words4 DrawWords(const std::uint32_t counter[4], const std::uint32_t key[2], VU index) {
+    const U u;
+    return Philox({hn::Set(u, counter[0]), index, hn::Set(u, counter[2]), hn::Set(u, counter[3])}, key[0], key[1]);
+}
+
+/// (0, 1], 31 bits: for -log(u), which then reaches 22 mean free paths.
+HWY_INLINE VF Uniform31(VU bits) {
+    const VF x = hn::ConvertTo(F(), hn::BitCast(I(), hn::ShiftRight<1>(bits)));
+    return hn::MulAdd(x, Constant(0x1p-31f), Constant(0x1p-32f));
+}
+/// (0, 1), 23 bits: never an end.
+HWY_INLINE VF Uniform23(VU bits) {
+    const VF x = hn::ConvertTo(F(), hn::BitCast(I(), hn::ShiftRight<9>(bits)));
+    return hn::MulAdd(x, Constant(0x1p-23f), Constant(0x1p-24f));
+}
+
+/// sin(pi v) for 0 <= v <= 1/2, relative error 1e-7.
+HWY_INLINE VF SinPi(VF v) {
+    const VF x = hn::Mul(v, Constant(kPiF)), z = hn::Mul(x, x);
+    VF p = Constant(2.6019031e-6f);
+    p = hn::MulAdd(p, z, Constant(-1.9807414e-4f));
+    p = hn::MulAdd(p, z, Constant(8.3330255e-3f));
+    p = hn::MulAdd(p, z, Constant(-1.6666657e-1f));
+    return hn::MulAdd(hn::Mul(p, z), x, x);
+}
+
+/// 2^z for z <= 0, relative error 2e-7; below 2^-126 it stays there.
+HWY_INLINE VF Exp2(VF z) {
+    z = hn::Max(z, Constant(-126.0f));
+    const VI n = hn::NearestInt(z);
+    const VF f = hn::Sub(z, hn::ConvertTo(F(), n));
+    VF p = Constant(1.3333558e-3f);
+    p = hn::MulAdd(p, f, Constant(9.6181291e-3f));
+    p = hn::MulAdd(p, f, Constant(5.5504109e-2f));
+    p = hn::MulAdd(p, f, Constant(2.4022651e-1f));
+    p = hn::MulAdd(p, f, Constant(6.9314718e-1f));
+    p = hn::MulAdd(p, f, Constant(1.0f));
+    return hn::BitCast(F(), hn::Add(hn::BitCast(I(), p), hn::ShiftLeft<23>(n)));
+}
+constexpr float kLog2E = 1.44269504f;
+
+struct VDirection {
+    VF x, y;
+};
+HWY_INLINE VDirection Rotate(VDirection a, VDirection b) {
+    return {hn::NegMulAdd(a.y, b.y, hn::Mul(a.x, b.x)), hn::MulAdd(a.x, b.y, hn::Mul(a.y, b.x))};
+}
+/// a turned back by b.
+HWY_INLINE VDirection RotateBack(VDirection a, VDirection b) {
+    return {hn::MulAdd(a.x, b.x, hn::Mul(a.y, b.y)), hn::NegMulAdd(a.x, b.y, hn::Mul(a.y, b.x))};
+}
+
+/// Planar Henyey-Greenstein by its inverse: tan(t / 2) = (1 - g) / (1 + g) tan(pi v), v uniform in [-1/2, 1/2].
+/// This is the Moebius form of physics.md, section 1, squared; nothing cancels as g -> 1.
+HWY_INLINE VDirection ScatterTurn(VF v, float g, float flip) {
+    const VF b = hn::Mul(Constant(1 - g), SinPi(hn::Abs(v)));
+    const VF a = hn::Mul(Constant(1 + g), SinPi(hn::Sub(Constant(0.5f), hn::Abs(v))));
+    const VF n = hn::Div(Constant(flip), hn::MulAdd(a, a, hn::Mul(b, b)));
+    const VF ab = hn::Mul(a, b);
+    return {hn::Mul(hn::Mul(hn::Sub(a, b), hn::Add(a, b)), n), hn::Mul(hn::CopySign(hn::Add(ab, ab), v), n)};
+}
+HWY_INLINE VF SignedUnit(VU bits) { return hn::Mul(hn::ConvertTo(F(), hn::BitCast(I(), bits)), Constant(0x1p-32f)); }
+
+/// exp(2 pi i f), 0 <= f <= 1.
+HWY_INLINE VDirection Turn(VF f) { return ScatterTurn(hn::Sub(f, Constant(0.5f)), 0.0f, -1.0f); }
+
+/// Coordinate of a lattice; `tent` folds it, so that what is not periodic becomes so (the baker's transform).
+HWY_INLINE VU Lattice(const WalkTracer::State& s, VU reversed, std::uint32_t dim, bool tent) {
+    const VI product = hn::Mul(hn::BitCast(I(), reversed), hn::Set(I(), static_cast<std::int32_t>(kLattice[dim])));
+    const VU u = hn::Add(hn::BitCast(U(), product), hn::Set(U(), s.shift[dim]));
+    if (!tent) return u;
+    const VU fold = hn::BitCast(U(), hn::ShiftRight<31>(hn::BitCast(I(), u)));
+    return hn::Xor(hn::Add(u, u), fold);
+}
+
+/// Distance to the boundary ahead; in the disc also behind, so that s = ahead * behind.
+struct Reach {
+    VF ahead, behind;
+};
+template <Medium M>
+HWY_INLINE Reach ReachOf(VF x, VF y, VF s, VDirection d) {
+    const VF tiny = Constant(1e-30f);
+    if (M == Medium::disc) {
+        const VF a = hn::MulAdd(x, d.x, hn::Mul(y, d.y));
+        const VF far = hn::Max(hn::Add(hn::Sqrt(hn::MulAdd(a, a, s)), hn::Abs(a)), tiny);
+        const VF near = hn::Div(s, far);
+        const MF outward = hn::Gt(a, hn::Zero(F()));
+        return {hn::IfThenElse(outward, near, far), hn::IfThenElse(outward, far, near)};
+    }
+    const VF left = hn::IfThenElse(hn::Gt(d.x, hn::Zero(F())), hn::Sub(Constant(2), x), x);
+    return {hn::Div(left, hn::Max(hn::Abs(d.x), tiny)), hn::Zero(F())};
+}
+
+/// 1 - exp(-x), x >= 0.
+HWY_INLINE VF Absorbed(VF x) {
+    // Below 1/8 the series: its first dropped term is x^4 / 120 < 2e-6... times x / 6 < 5e-8.
+    VF p = Constant(-1.0f / 720);
+    p = hn::MulAdd(p, x, Constant(1.0f / 120));
+    p = hn::MulAdd(p, x, Constant(-1.0f / 24));
+    p = hn::MulAdd(p, x, Constant(1.0f / 6));
+    p = hn::MulAdd(p, x, Constant(-0.5f));
+    p = hn::MulAdd(p, x, Constant(1.0f));
+    const VF direct = hn::Sub(Constant(1), Exp2(hn::Mul(x, Constant(-kLog2E))));
+    return hn::IfThenElse(hn::Lt(x, Constant(0.125f)), hn::Mul(p, x), direct);
+}
+
+/// Depth of the first collision in mean free paths: -log(1 - u share).
+HWY_INLINE VF ForcedDepth(VF u, VF share) { return hn::Neg(hn::Log1p(F(), hn::Neg(hn::Mul(u, share)))); }
+
+/// What all deposits of one vertex share. Positions and directions are in the frame that the offset turned.
+struct Vertex {
+    VF x, y, s, rest, dx, dy, cos_turn, sin_turn, weight;
+};
+
+/// Light that leaves towards u: weight p(d . u) exp(-sigma distance).
+template <Medium M>
+HWY_INLINE VF Escaping(const WalkTracer::State& st, const Vertex& v, VF ux, VF uy, VF& distance, MF& forward) {
+    const F f;
+    if (M == Medium::disc) {
+        const VF a = hn::MulAdd(v.x, ux, hn::Mul(v.y, uy));
+        distance = hn::Max(hn::Sub(hn::Sqrt(hn::MulAdd(a, a, v.s)), a), hn::Zero(f));
+    } else {
+        const VF cosine = hn::NegMulAdd(uy, v.sin_turn, hn::Mul(ux, v.cos_turn));
+        forward = hn::Gt(cosine, hn::Zero(f));
+        distance = hn::Div(hn::IfThenElse(forward, v.rest, v.s), hn::Max(hn::Abs(cosine), Constant(1e-20f)));
+    }
+    // |d - u|^2 = 2 - 2 cos keeps the peak's digits as g -> 1.
+    const VF ex = hn::Sub(v.dx, ux), ey = hn::Sub(v.dy, uy);
+    const VF q = hn::MulAdd(Constant(st.g), hn::MulAdd(ex, ex, hn::Mul(ey, ey)), Constant(st.p_floor));
+    return hn::Div(hn::Mul(v.weight, Exp2(hn::Mul(distance, Constant(-st.sigma * kLog2E)))), q);
+}
+
+/// Deposits of one vertex into the bins of its comb, and of its window. `length`: slab, sums of light times path.
+template <Medium M, bool kWindow>
+HWY_INLINE void PayOne(WalkTracer::State& st, std::size_t i, VF length[2]) {
+    const F f;
+    const I in;
+    const std::size_t lanes = hn::Lanes(f);
+    const Payments& p = st.pay;
+    const Walks& w = st.walks;
+    const std::int32_t comb = static_cast<std::int32_t>(st.cell.plan.comb);
+    Vertex v{hn::Set(f, p.far_x[i]),   hn::Set(f, p.far_y[i]),   hn::Set(f, M == Medium::disc ? w.s[i] : w.x[i]),
+             hn::Set(f, 2 - w.x[i]),   hn::Set(f, p.far_dx[i]),  hn::Set(f, p.far_dy[i]),
+             hn::Set(f, p.cos_far[i]), hn::Set(f, p.sin_far[i]), hn::Set(f, p.weight[i] * static_cast<float>(comb))};
+    const VF so_far = hn::Set(f, w.y[i]);
+    VF distance;
+    MF forward = hn::Lt(so_far, so_far);
+    float* sum = st.comb_sum.data() + static_cast<std::size_t>(p.offset[i]) * st.comb_stride;
+    const VI bins = hn::Set(in, static_cast<std::int32_t>(st.cell.bins));
+    const VI width = hn::Set(in, static_cast<std::int32_t>(st.cell.plan.window) - 1);
+    VI bin = hn::Add(hn::Mul(hn::Iota(in, 0), hn::Set(in, comb)), hn::Set(in, p.offset[i] - p.window[i]));
+    const VI stride = hn::Set(in, static_cast<std::int32_t>(lanes) * comb);
+    for (std::size_t k = 0; k < st.comb_count; k += lanes) {
+        const VF ux = hn::LoadU(f, st.comb_x.data() + k), uy = hn::LoadU(f, st.comb_y.data() + k);
+        VF value = Escaping<M>(st, v, ux, uy, distance, forward);
+        if (kWindow) {
+            const VI relative = hn::Add(bin, hn::And(bins, hn::BroadcastSignBit(bin)));
+            value = hn::IfThenElseZero(hn::RebindMask(f, hn::Gt(relative, width)), value);
+            bin = hn::Add(bin, stride);
+        }
+        if (M == Medium::slab) {
+            value = hn::IfThenElseZero(hn::FirstN(f, st.comb_count - k), value);
+            const VF moment = hn::Mul(value, hn::Add(so_far, distance));
+            length[0] = hn::Add(length[0], hn::IfThenZeroElse(forward, moment));
+            length[1] = hn::Add(length[1], hn::IfThenElseZero(forward, moment));
+        }
+        hn::StoreU(hn::Add(hn::LoadU(f, sum + k), value), f, sum + k);
+    }
+    if (!kWindow) return;
+    const std::size_t k0 = static_cast<std::size_t>(p.window[i]);
+    v.x = hn::Set(f, p.near_x[i]), v.y = hn::Set(f, p.near_y[i]);
+    v.dx = hn::Set(f, p.near_dx[i]), v.dy = hn::Set(f, p.near_dy[i]);
+    v.cos_turn = hn::Set(f, p.cos_near[i]), v.sin_turn = hn::Set(f, p.sin_near[i]);
+    v.weight = hn::Set(f, p.weight[i]);
+    float* near_sum = st.window_sum.data() + k0;
+    for (std::size_t k = 0; k < st.cell.plan.window; k += lanes) {
+        const VF ux = hn::LoadU(f, st.window_x.data() + k0 + k), uy = hn::LoadU(f, st.window_y.data() + k0 + k);
+        const VF value = Escaping<M>(st, v, ux, uy, distance, forward);
+        if (M == Medium::slab) {
+            const VF moment = hn::Mul(value, hn::Add(so_far, distance));
+            length[0] = hn::Add(length[0], hn::IfThenZeroElse(forward, moment));
+            length[1] = hn::Add(length[1], hn::IfThenElseZero(forward, moment));
+        }
+        hn::StoreU(hn::Add(hn::LoadU(f, near_sum + k), value), f, near_sum + k);
+    }
+}
+
+/// Angle of a direction in turns, [0, 1), to 1e-3: where a window is placed needs no more.
+HWY_INLINE VF RoughTurns(VDirection d) {
+    const VF ax = hn::Abs(d.x), ay = hn::Abs(d.y), one = Constant(1);
+    const VF r = hn::Div(hn::Min(ax, ay), hn::Max(hn::Max(ax, ay), Constant(1e-30f)));
+    VF t = hn::Mul(r, hn::MulAdd(hn::Sub(one, r), Constant(0.0434f), Constant(0.125f)));
+    t = hn::IfThenElse(hn::Gt(ay, ax), hn::Sub(Constant(0.25f), t), t);
+    t = hn::IfThenElse(hn::Lt(d.x, hn::Zero(F())), hn::Sub(Constant(0.5f), t), t);
+    return hn::IfThenElse(hn::Lt(d.y, hn::Zero(F())), hn::Sub(one, t), t);
+}
+
+/// Which vertices are paid, with what weight, at which offsets; then pays them.
+template <Medium M, bool kWindow>
+void Pay(WalkTracer::State& st, std::size_t count, TracerSums& sums) {
+    const F f;
+    const std::size_t lanes = hn::Lanes(f);
+    Walks& w = st.walks;
+    Payments& p = st.pay;
+    const float comb = static_cast<float>(st.cell.plan.comb), bins = static_cast<float>(st.cell.bins);
+    const float start = M == Medium::disc ? 0.5f : 0.25f;  // bin 0 lies this many turns below angle 0
+    for (std::size_t i = 0; i < count; i += lanes) {
+        const VF x = hn::LoadU(f, &w.x[i]), y = hn::LoadU(f, &w.y[i]), s = hn::LoadU(f, &w.s[i]);
+        const VF weight = hn::LoadU(f, &w.w[i]);
+        const VF flip = Constant(st.flip);
+        const VDirection d{hn::Mul(flip, hn::LoadU(f, &w.dx[i])), hn::Mul(flip, hn::LoadU(f, &w.dy[i]))};
+        VF nearest;
+        if (M == Medium::disc) {
+            const VF r = hn::Sqrt(hn::Max(hn::Sub(Constant(1), s), hn::Zero(f)));
+            nearest = hn::Div(s, hn::Add(Constant(1), r));
+        } else {
+            nearest = hn::Min(x, hn::Sub(Constant(2), x));
+        }
+        const VF escape = hn::Mul(weight, Exp2(hn::Mul(nearest, Constant(-st.sigma * kLog2E))));
+        const VF chance = hn::Min(Constant(1), hn::Mul(escape, Constant(1 / st.cell.plan.pay)));
+        const MF paid = hn::Lt(hn::LoadU(f, &w.chance[i]), chance);
+        const VF value = hn::Div(hn::Mul(weight, Constant(st.p_scale)), hn::Max(chance, Constant(1e-30f)));
+        hn::StoreU(hn::IfThenElseZero(paid, value), f, &p.weight[i]);
+
+        const VF place = hn::Mul(Uniform23(hn::LoadU(U(), &w.place[i])), Constant(comb));
+        const VF offset = hn::Floor(place);
+        hn::StoreU(hn::ConvertTo(I(), offset), I(), &p.offset[i]);
+        const VDirection turn = Turn(hn::Mul(place, Constant(1 / bins)));
+        const VDirection far = RotateBack({x, y}, turn), far_d = RotateBack(d, turn);
+        hn::StoreU(far.x, f, &p.far_x[i]), hn::StoreU(far.y, f, &p.far_y[i]);
+        hn::StoreU(far_d.x, f, &p.far_dx[i]), hn::StoreU(far_d.y, f, &p.far_dy[i]);
+        hn::StoreU(turn.x, f, &p.cos_far[i]), hn::StoreU(turn.y, f, &p.sin_far[i]);
+        if (kWindow) {
+            const VDirection inner = Turn(hn::Mul(hn::Sub(place, offset), Constant(1 / bins)));
+            const VDirection near = RotateBack({x, y}, inner), near_d = RotateBack(d, inner);
+            hn::StoreU(near.x, f, &p.near_x[i]), hn::StoreU(near.y, f, &p.near_y[i]);
+            hn::StoreU(near_d.x, f, &p.near_dx[i]), hn::StoreU(near_d.y, f, &p.near_dy[i]);
+            hn::StoreU(inner.x, f, &p.cos_near[i]), hn::StoreU(inner.y, f, &p.sin_near[i]);
+            const float shift = start - 0.5f * static_cast<float>(st.cell.plan.window) / bins + 1;
+            VF turns = hn::Add(RoughTurns(d), Constant(shift));
+            turns = hn::Sub(turns, hn::Floor(turns));
+            const VF first = hn::Min(hn::Floor(hn::Mul(turns, Constant(bins))), Constant(bins - 1));
+            hn::StoreU(hn::ConvertTo(I(), first), I(), &p.window[i]);
+        }
+    }
+    VF length[2] = {hn::Zero(f), hn::Zero(f)};
+    std::uint64_t deposits = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!(p.weight[i] > 0)) continue;
+        PayOne<M, kWindow>(st, i, length);
+        ++deposits;
+    }
+    sums.deposits += deposits * (st.comb_count + st.cell.plan.window);
+    if (M == Medium::slab) {
+        const double width = 2 * 3.14159265358979323846 / static_cast<double>(st.cell.bins);
+        for (const int side : {0, 1})
+            sums.length[side] += width * static_cast<double>(hn::GetLane(hn::SumOfLanes(f, length[side])));
+    }
+}
+
+/// First collisions, in the direction of the light. @return sum of their flights
+template <Medium M>
+double Start(WalkTracer::State& st, std::size_t count) {
+    const F f;
+    const std::size_t lanes = hn::Lanes(f);
+    Walks& w = st.walks;
+    double length = 0;
+    for (std::size_t i = 0; i < count; i += lanes) {
+        const VU reversed = hn::LoadU(U(), &w.reversed[i]);
+        const VF depth = ForcedDepth(Uniform23(Lattice(st, reversed, 0, true)), Constant(st.first_share));
+        if (M == Medium::disc) {
+            const VF t = hn::Min(hn::Mul(depth, Constant(1 / st.sigma)), Constant(st.chord));
+            hn::StoreU(hn::Sub(t, Constant(st.half)), f, &w.x[i]);
+            hn::StoreU(Constant(st.h), f, &w.y[i]);
+            hn::StoreU(hn::Mul(t, hn::Sub(Constant(st.chord), t)), f, &w.s[i]);
+            const MF valid = hn::FirstN(f, count - i);
+            length += static_cast<double>(hn::GetLane(hn::SumOfLanes(f, hn::IfThenElseZero(valid, t))));
+        } else {
+            const VF x = hn::Min(hn::Mul(depth, Constant(st.mu / st.sigma)), Constant(2));
+            hn::StoreU(x, f, &w.x[i]);
+            hn::StoreU(hn::Min(hn::Mul(depth, Constant(1 / st.sigma)), Constant(st.chord)), f, &w.y[i]);
+        }
+        hn::StoreU(Constant(st.dir_x), f, &w.dx[i]);
+        hn::StoreU(Constant(st.dir_y), f, &w.dy[i]);
+        hn::StoreU(Constant(1), f, &w.w[i]);
+    }
+    return length;
+}
+
+/// Scatters the walks at their vertices and flies on; walks that end are squeezed out. @return how many go on
+template <Medium M, bool kForced>
+std::size_t Fly(WalkTracer::State& st, std::uint32_t order, std::uint32_t randomisation, std::size_t count, float keep,
+                TracerSums& sums) {
+    const F f;
+    const U u;
+    const std::size_t lanes = hn::Lanes(f);
+    Walks& w = st.walks;
+    const std::uint32_t counter[4] = {(order & 0xFFFFFFu) | randomisation << 24, 0,
+                                      static_cast<std::uint32_t>(st.cell.cell),
+                                      static_cast<std::uint32_t>(st.cell.cell >> 32)};
+    const bool lattice = 2 * order < kLatticeDims;
+    const VF per_sigma = Constant(1 / st.sigma), zero = hn::Zero(f);
+    VF length = zero;
+    std::size_t out = 0;
+    for (std::size_t i = 0; i < count; i += lanes) {
+        VF x = hn::LoadU(f, &w.x[i]), y = hn::LoadU(f, &w.y[i]), s = hn::LoadU(f, &w.s[i]);
+        VDirection d{hn::LoadU(f, &w.dx[i]), hn::LoadU(f, &w.dy[i])};
+        VF weight = hn::LoadU(f, &w.w[i]);
+        const VU index = hn::LoadU(u, &w.index[i]), reversed = hn::LoadU(u, &w.reversed[i]);
+        Words4 words = DrawWords(counter, st.key, index);
+        if (lattice) {
+            words.a = Lattice(st, reversed, 2 * order - 1, false);
+            words.b = Lattice(st, reversed, 2 * order, true);
+        }
+        d = Rotate(d, ScatterTurn(SignedUnit(words.a), st.g, st.flip));
+        // One Newton step keeps the length of the direction at 1 however long the walk.
+        const VF n = hn::NegMulAdd(hn::Mul(Constant(0.5f), d.x), d.x,
+                                   hn::NegMulAdd(hn::Mul(Constant(0.5f), d.y), d.y, Constant(1.5f)));
+        d = {hn::Mul(d.x, n), hn::Mul(d.y, n)};
+        const Reach reach = ReachOf<M>(x, y, s, d);
+        MF alive = hn::FirstN(f, count - i);
+        VF t;
+        VF chance = Uniform23(words.c);
+        if (kForced) {
+            const VF share = Absorbed(hn::Mul(Constant(st.sigma), reach.ahead));
+            if (M == Medium::disc)
+                length = hn::Add(length, hn::IfThenElseZero(alive, hn::Mul(weight, hn::Mul(share, per_sigma))));
+            // Roulette; what is left of its number in a walk that survives is uniform again, for the payment.
+            const VF factor = hn::Max(share, Constant(keep)), survival = hn::Div(share, factor);
+            alive = hn::And(alive, hn::Lt(chance, survival));
+            chance = hn::Div(chance, survival);
+            weight = hn::Mul(weight, factor);
+            t = hn::Min(hn::Mul(ForcedDepth(Uniform23(words.b), share), per_sigma), reach.ahead);
+        } else {
+            t = hn::Mul(hn::Neg(hn::Log(f, Uniform31(words.b))), per_sigma);
+            if (M == Medium::disc)
+                length = hn::Add(length, hn::IfThenElseZero(alive, hn::Mul(weight, hn::Min(t, reach.ahead))));
+            alive = hn::And(alive, hn::Lt(t, reach.ahead));
+            t = hn::Min(t, reach.ahead);
+        }
+        x = hn::MulAdd(t, d.x, x);
+        if (M == Medium::disc) {
+            y = hn::MulAdd(t, d.y, y);
+            s = hn::Mul(hn::Sub(reach.ahead, t), hn::Add(reach.behind, t));
+            const VF fresh = hn::NegMulAdd(x, x, hn::NegMulAdd(y, y, Constant(1)));
+            s = hn::IfThenElse(hn::Gt(s, Constant(0.1f)), fresh, s);
+        } else {
+            x = hn::Min(hn::Max(x, zero), Constant(2));
+            y = hn::Add(y, t);
+        }
+        hn::CompressStore(x, alive, f, &w.x[out]);
+        hn::CompressStore(y, alive, f, &w.y[out]);
+        if (M == Medium::disc) hn::CompressStore(s, alive, f, &w.s[out]);
+        hn::CompressStore(d.x, alive, f, &w.dx[out]);
+        hn::CompressStore(d.y, alive, f, &w.dy[out]);
+        hn::CompressStore(weight, alive, f, &w.w[out]);
+        const auto alive_u = hn::RebindMask(u, alive);
+        hn::CompressStore(index, alive_u, u, &w.index[out]);
+        hn::CompressStore(reversed, alive_u, u, &w.reversed[out]);
+        hn::CompressStore(words.d, alive_u, u, &w.place[out]);
+        hn::CompressStore(chance, alive, f, &w.chance[out]);
+        out += hn::CountTrue(f, alive);
+    }
+    sums.scatterings += count;
+    if (M == Medium::disc) sums.length[0] += static_cast<double>(hn::GetLane(hn::SumOfLanes(f, length)));
+    return out;
+}
+
+template <Medium M, bool kWindow>
+void Batch(WalkTracer::State& st, std::uint32_t randomisation, std::size_t count, TracerSums& sums) {
+    const TracerPlan& plan = st.cell.plan;
+    const double flights = Start<M>(st, count);
+    if (M == Medium::disc) sums.length[0] += flights;
+    for (std::uint32_t order = 1; count > 0; ++order) {
+        // Every walk is scattered twice; later ones may end.
+        if (order == 1)
+            count = Fly<M, true>(st, order, randomisation, count, 1e-37f, sums);
+        else if (order <= plan.forced)
+            count = Fly<M, true>(st, order, randomisation, count, plan.keep, sums);
+        else
+            count = Fly<M, false>(st, order, randomisation, count, 1, sums);
+        Pay<M, kWindow>(st, count, sums);
+    }
+}
+
+void TraceBatch(WalkTracer::State& st, std::uint32_t randomisation, std::size_t count, TracerSums& sums) {
+    const bool window = st.cell.plan.window > 0;
+    if (st.cell.medium == Medium::disc)
+        window ? Batch<Medium::disc, true>(st, randomisation, count, sums)
+               : Batch<Medium::disc, false>(st, randomisation, count, sums);
+    else
+        window ? Batch<Medium::slab, true>(st, randomisation, count, sums)
+               : Batch<Medium::slab, false>(st, randomisation, count, sums);
+}
+
+/// Words of `count` walks; the arrays are longer by kLaneMargin. words[k * stride + i], stride = count + kLaneMargin.
+void Words(const TracerCounter& c, const std::uint32_t* index, std::size_t count, std::uint32_t* words) {
+    const U u;
+    const std::size_t stride = count + kLaneMargin;
+    for (std::size_t i = 0; i < count; i += hn::Lanes(u)) {
+        const Words4 w = DrawWords(c.counter.data(), c.key.data(), hn::LoadU(u, index + i));
+        hn::StoreU(w.a, u, words + i), hn::StoreU(w.b, u, words + stride + i);
+        hn::StoreU(w.c, u, words + 2 * stride + i), hn::StoreU(w.d, u, words + 3 * stride + i);
+    }
+}
+
+const char* Target() { return hwy::TargetName(HWY_TARGET); }
+
+}  // namespace HWY_NAMESPACE
+}  // namespace medulla::sim2d
+HWY_AFTER_NAMESPACE();
+#endif

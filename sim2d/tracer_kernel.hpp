@@ -16,8 +16,9 @@ enum class Medium { disc, slab };
 struct TracerPlan {
     std::uint32_t forced = 4;  ///< flights after the first that are kept inside by a weight where that is likely anyway
     float keep = 0.3f;         ///< such a flight ends by roulette where less than this share of it collides, in (0, 1]
-    float pay = 0.25f;         ///< a vertex whose escape weight is smaller is paid out by roulette
-    std::uint32_t comb = 1;    ///< every comb-th bin gets a deposit, times comb; divides the bins
+    float turned = 1;        ///< of the escape weight: share of the nearest way out, the rest is the way ahead; (0, 1]
+    float pay = 0.25f;       ///< a vertex whose escape weight is smaller is paid out by roulette
+    std::uint32_t comb = 1;  ///< every comb-th bin gets a deposit, times comb; divides the bins
     std::uint32_t window = 0;  ///< bins about the peak of the phase function that always get theirs; multiple of 16
 };
 

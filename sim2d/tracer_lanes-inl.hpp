@@ -199,12 +199,11 @@ HWY_INLINE void PayOne(WalkTracer::State& st, std::size_t i, VF length[2]) {
     const I in;
     const std::size_t lanes = hn::Lanes(f);
     const Payments& p = st.pay;
-    const Walks& w = st.walks;
     const std::int32_t comb = static_cast<std::int32_t>(st.cell.plan.comb);
-    Vertex v{hn::Set(f, p.far_x[i]),   hn::Set(f, p.far_y[i]),   hn::Set(f, M == Medium::disc ? w.s[i] : w.x[i]),
-             hn::Set(f, 2 - w.x[i]),   hn::Set(f, p.far_dx[i]),  hn::Set(f, p.far_dy[i]),
+    Vertex v{hn::Set(f, p.far_x[i]),   hn::Set(f, p.far_y[i]),   hn::Set(f, M == Medium::disc ? p.s[i] : p.x[i]),
+             hn::Set(f, 2 - p.x[i]),   hn::Set(f, p.far_dx[i]),  hn::Set(f, p.far_dy[i]),
              hn::Set(f, p.cos_far[i]), hn::Set(f, p.sin_far[i]), hn::Set(f, p.weight[i] * static_cast<float>(comb))};
-    const VF so_far = hn::Set(f, w.y[i]);
+    const VF so_far = hn::Set(f, p.y[i]);
     VF distance;
     MF forward = hn::Lt(so_far, so_far);
     float* sum = st.comb_sum.data() + static_cast<std::size_t>(p.offset[i]) * st.comb_stride;
@@ -257,19 +256,52 @@ HWY_INLINE VF RoughTurns(VDirection d) {
     return hn::IfThenElse(hn::Lt(d.y, hn::Zero(F())), hn::Sub(one, t), t);
 }
 
-/// Which vertices are paid, with what weight, at which offsets; then pays them.
-template <Medium M, bool kWindow>
-void Pay(WalkTracer::State& st, std::size_t count, TracerSums& sums) {
+/// Stores the lanes that a mask keeps, one after the other; up to a vector beyond them is overwritten.
+/// AVX2 has no such instruction: one permutation, looked up once, serves all arrays.
+class Squeeze {
+  public:
+    explicit Squeeze(MF kept) : kept_(kept) {
+#if HWY_TARGET == HWY_AVX2
+        std::uint8_t bits[8];
+        hn::StoreMaskBits(F(), kept, bits);
+        const U u;
+        const VU packed = hn::Shr(hn::Set(u, kSqueeze.lanes[bits[0]]), hn::ShiftLeft<2>(hn::Iota(u, 0)));
+        order_ = hn::And(packed, hn::Set(u, 7));
+#endif
+    }
+    HWY_INLINE void Store(VF v, float* to) const {
+#if HWY_TARGET == HWY_AVX2
+        hn::StoreU(hn::TableLookupLanes(v, hn::IndicesFromVec(F(), hn::BitCast(I(), order_))), F(), to);
+#else
+        hn::CompressStore(v, kept_, F(), to);
+#endif
+    }
+    HWY_INLINE void Store(VU v, std::uint32_t* to) const {
+#if HWY_TARGET == HWY_AVX2
+        hn::StoreU(hn::TableLookupLanes(v, hn::IndicesFromVec(U(), order_)), U(), to);
+#else
+        hn::CompressStore(v, hn::RebindMask(U(), kept_), U(), to);
+#endif
+    }
+
+  private:
+    MF kept_;
+#if HWY_TARGET == HWY_AVX2
+    VU order_;
+#endif
+};
+
+/// Vertices that roulette lets be paid go to the payments, with their weight. @return how many
+template <Medium M>
+std::size_t Choose(WalkTracer::State& st, std::size_t count) {
     const F f;
-    const std::size_t lanes = hn::Lanes(f);
-    Walks& w = st.walks;
+    const Walks& w = st.walks;
     Payments& p = st.pay;
-    const float comb = static_cast<float>(st.cell.plan.comb), bins = static_cast<float>(st.cell.bins);
-    const float start = M == Medium::disc ? 0.5f : 0.25f;  // bin 0 lies this many turns below angle 0
-    for (std::size_t i = 0; i < count; i += lanes) {
+    const VF rate = Constant(-st.sigma * kLog2E), beta = Constant(st.cell.plan.turned), flip = Constant(st.flip);
+    std::size_t out = 0;
+    for (std::size_t i = 0; i < count; i += hn::Lanes(f)) {
         const VF x = hn::LoadU(f, &w.x[i]), y = hn::LoadU(f, &w.y[i]), s = hn::LoadU(f, &w.s[i]);
         const VF weight = hn::LoadU(f, &w.w[i]);
-        const VF flip = Constant(st.flip);
         const VDirection d{hn::Mul(flip, hn::LoadU(f, &w.dx[i])), hn::Mul(flip, hn::LoadU(f, &w.dy[i]))};
         VF nearest;
         if (M == Medium::disc) {
@@ -278,13 +310,34 @@ void Pay(WalkTracer::State& st, std::size_t count, TracerSums& sums) {
         } else {
             nearest = hn::Min(x, hn::Sub(Constant(2), x));
         }
-        const VF escape = hn::Mul(weight, Exp2(hn::Mul(nearest, Constant(-st.sigma * kLog2E))));
+        // Light that goes straight on leaves along the peak of the phase function, light that turns by the nearest way.
+        const VF straight = Exp2(hn::Mul(ReachOf<M>(x, y, s, d).ahead, rate)), turned = Exp2(hn::Mul(nearest, rate));
+        const VF escape = hn::Mul(weight, hn::MulAdd(beta, hn::Sub(turned, straight), straight));
         const VF chance = hn::Min(Constant(1), hn::Mul(escape, Constant(1 / st.cell.plan.pay)));
-        const MF paid = hn::Lt(hn::LoadU(f, &w.chance[i]), chance);
+        const MF paid = hn::And(hn::Lt(hn::LoadU(f, &w.chance[i]), chance), hn::FirstN(f, count - i));
         const VF value = hn::Div(hn::Mul(weight, Constant(st.p_scale)), hn::Max(chance, Constant(1e-30f)));
-        hn::StoreU(hn::IfThenElseZero(paid, value), f, &p.weight[i]);
+        const Squeeze squeeze(paid);
+        squeeze.Store(value, &p.weight[out]), squeeze.Store(hn::LoadU(U(), &w.place[i]), &p.place[out]);
+        squeeze.Store(x, &p.x[out]), squeeze.Store(y, &p.y[out]), squeeze.Store(s, &p.s[out]);
+        squeeze.Store(d.x, &p.far_dx[out]), squeeze.Store(d.y, &p.far_dy[out]);
+        out += hn::CountTrue(f, paid);
+    }
+    return out;
+}
 
-        const VF place = hn::Mul(Uniform23(hn::LoadU(U(), &w.place[i])), Constant(comb));
+/// Pays the vertices that are chosen: at which offset in the comb and in the bin, then into every bin.
+template <Medium M, bool kWindow>
+void Pay(WalkTracer::State& st, std::size_t count, TracerSums& sums) {
+    const F f;
+    const std::size_t lanes = hn::Lanes(f);
+    Payments& p = st.pay;
+    count = Choose<M>(st, count);
+    const float comb = static_cast<float>(st.cell.plan.comb), bins = static_cast<float>(st.cell.bins);
+    const float start = M == Medium::disc ? 0.5f : 0.25f;  // bin 0 lies this many turns below angle 0
+    for (std::size_t i = 0; i < count; i += lanes) {
+        const VF x = hn::LoadU(f, &p.x[i]), y = hn::LoadU(f, &p.y[i]);
+        const VDirection d{hn::LoadU(f, &p.far_dx[i]), hn::LoadU(f, &p.far_dy[i])};
+        const VF place = hn::Mul(Uniform23(hn::LoadU(U(), &p.place[i])), Constant(comb));
         const VF offset = hn::Floor(place);
         hn::StoreU(hn::ConvertTo(I(), offset), I(), &p.offset[i]);
         const VDirection turn = Turn(hn::Mul(place, Constant(1 / bins)));
@@ -306,13 +359,8 @@ void Pay(WalkTracer::State& st, std::size_t count, TracerSums& sums) {
         }
     }
     VF length[2] = {hn::Zero(f), hn::Zero(f)};
-    std::uint64_t deposits = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        if (!(p.weight[i] > 0)) continue;
-        PayOne<M, kWindow>(st, i, length);
-        ++deposits;
-    }
-    sums.deposits += deposits * (st.comb_count + st.cell.plan.window);
+    for (std::size_t i = 0; i < count; ++i) PayOne<M, kWindow>(st, i, length);
+    sums.deposits += count * (st.comb_count + st.cell.plan.window);
     if (M == Medium::slab) {
         const double width = 2 * 3.14159265358979323846 / static_cast<double>(st.cell.bins);
         for (const int side : {0, 1})
@@ -410,17 +458,13 @@ std::size_t Fly(WalkTracer::State& st, std::uint32_t order, std::uint32_t random
             x = hn::Min(hn::Max(x, zero), Constant(2));
             y = hn::Add(y, t);
         }
-        hn::CompressStore(x, alive, f, &w.x[out]);
-        hn::CompressStore(y, alive, f, &w.y[out]);
-        if (M == Medium::disc) hn::CompressStore(s, alive, f, &w.s[out]);
-        hn::CompressStore(d.x, alive, f, &w.dx[out]);
-        hn::CompressStore(d.y, alive, f, &w.dy[out]);
-        hn::CompressStore(weight, alive, f, &w.w[out]);
-        const auto alive_u = hn::RebindMask(u, alive);
-        hn::CompressStore(index, alive_u, u, &w.index[out]);
-        hn::CompressStore(reversed, alive_u, u, &w.reversed[out]);
-        hn::CompressStore(words.d, alive_u, u, &w.place[out]);
-        hn::CompressStore(chance, alive, f, &w.chance[out]);
+        const Squeeze squeeze(alive);
+        squeeze.Store(x, &w.x[out]), squeeze.Store(y, &w.y[out]);
+        if (M == Medium::disc) squeeze.Store(s, &w.s[out]);
+        squeeze.Store(d.x, &w.dx[out]), squeeze.Store(d.y, &w.dy[out]);
+        squeeze.Store(weight, &w.w[out]), squeeze.Store(chance, &w.chance[out]);
+        squeeze.Store(index, &w.index[out]), squeeze.Store(reversed, &w.reversed[out]);
+        squeeze.Store(words.d, &w.place[out]);
         out += hn::CountTrue(f, alive);
     }
     sums.scatterings += count;

@@ -12,7 +12,7 @@ namespace medulla::sim2d {
 
 inline constexpr std::size_t kLaneMargin = 64;  ///< arrays are this much longer than what they hold
 inline constexpr std::size_t kBatch = 2048;     ///< walks followed together
-inline constexpr std::uint32_t kLatticeDims = 13;
+inline constexpr std::uint32_t kLatticeDims = 25;
 
 /// Walks of a batch: position, direction, weight. Disc: s = 1 - r^2, kept beside x and y without cancellation.
 /// Slab: x is the depth, y the path length so far.
@@ -27,20 +27,35 @@ struct Walks {
     }
 };
 
-/// Vertices ready to be paid out: weight 0 where roulette passed them over. "Near" is turned back by the offset in the
+/// Vertices to be paid out. "Near" is turned back by the offset in the
 /// bin, "far" by that and the comb's offset.
 struct Payments {
-    std::vector<float> weight, far_x, far_y, far_dx, far_dy, near_x, near_y, near_dx, near_dy, cos_far, sin_far,
-        cos_near, sin_near;
+    std::vector<float> weight, x, y, s, far_x, far_y, far_dx, far_dy, near_x, near_y, near_dx, near_dy, cos_far,
+        sin_far, cos_near, sin_near;
     std::vector<std::int32_t> offset, window;
+    std::vector<std::uint32_t> place;
 
     void reserve(std::size_t n) {
-        for (auto* v : {&weight, &far_x, &far_y, &far_dx, &far_dy, &near_x, &near_y, &near_dx, &near_dy, &cos_far,
-                        &sin_far, &cos_near, &sin_near})
+        for (auto* v : {&weight, &x, &y, &s, &far_x, &far_y, &far_dx, &far_dy, &near_x, &near_y, &near_dx, &near_dy,
+                        &cos_far, &sin_far, &cos_near, &sin_near})
             v->assign(n, 0.0f);
         for (auto* v : {&offset, &window}) v->assign(n, 0);
+        place.assign(n, 0u);
     }
 };
+
+/// For each set of eight lanes, which of them come first: their numbers in nibbles, the lowest first.
+struct SqueezeTable {
+    std::uint32_t lanes[256] = {};
+    constexpr SqueezeTable() {
+        for (std::uint32_t set = 0; set < 256; ++set) {
+            std::uint32_t place = 0;
+            for (std::uint32_t lane = 0; lane < 8; ++lane)
+                if (set >> lane & 1u) lanes[set] |= lane << (4 * place++);
+        }
+    }
+};
+inline constexpr SqueezeTable kSqueeze{};
 
 struct WalkTracer::State {
     TracerCell cell;
@@ -58,7 +73,8 @@ struct WalkTracer::State {
 };
 
 /// Extensible rank-1 lattice exod2_base2_m20 of Kuo (Cools, Kuo, Nuyens 2006, "Constructing embedded lattice rules").
-inline constexpr std::uint32_t kLattice[kLatticeDims] = {1,      182667, 469891, 498753, 110745, 446247, 250185,
-                                                         118627, 245333, 283199, 408519, 391023, 246327};
+inline constexpr std::uint32_t kLattice[kLatticeDims] = {
+    1,      182667, 469891, 498753, 110745, 446247, 250185, 118627, 245333, 283199, 408519, 391023, 246327,
+    126539, 399185, 461527, 300343, 69681,  516695, 436179, 106383, 238523, 413283, 70841,  47719};
 
 }  // namespace medulla::sim2d

@@ -111,6 +111,10 @@ class Estimate {
             lobe.share_error = sides_.size() > 1 ? std::sqrt(share_variance / pairs) : 0.0;
             lobe.standard_error = std::sqrt(variance / pairs / squares + kRounding * kRounding);
         }
+        // Rounding must not leave a side with more than all of the energy.
+        double shares = 0;
+        for (const Lobe& lobe : out) shares += lobe.share;
+        for (Lobe& lobe : out) lobe.share /= shares;
         return out;
     }
 

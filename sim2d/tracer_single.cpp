@@ -12,7 +12,7 @@ namespace {
 
 const double pi = 3.14159265358979323846;
 
-/// x - (1 + x) (1 - ...): 1 - (1 + a) exp(-a) for a >= 0, by its series where that cancels.
+/// 1 - (1 + a) exp(-a) for a >= 0, by its series where that cancels.
 double second_moment(double a) {
     if (a > 0.5) return std::isinf(a) ? 1.0 : -std::expm1(-a) - a * std::exp(-a);
     // sum over k >= 2 of (-1)^k (k - 1) / k! a^k

@@ -135,7 +135,7 @@ HWY_INLINE VU Lattice(const WalkTracer::State& s, VU reversed, std::uint32_t dim
     return hn::Xor(hn::Add(u, u), fold);
 }
 
-/// Distance to the boundary ahead; in the disc also behind, so that s = ahead * behind.
+/// Distances to the boundary ahead and behind; in the disc s = ahead * behind.
 struct Reach {
     VF ahead, behind;
 };
@@ -150,7 +150,8 @@ HWY_INLINE Reach ReachOf(VF x, VF y, VF s, VDirection d) {
         return {hn::IfThenElse(outward, near, far), hn::IfThenElse(outward, far, near)};
     }
     const VF left = hn::IfThenElse(hn::Gt(d.x, hn::Zero(F())), hn::Sub(Constant(2), x), x);
-    return {hn::Div(left, hn::Max(hn::Abs(d.x), tiny)), hn::Zero(F())};
+    const VF per_cosine = hn::Div(Constant(1), hn::Max(hn::Abs(d.x), tiny));
+    return {hn::Mul(left, per_cosine), hn::Mul(hn::Sub(Constant(2), left), per_cosine)};
 }
 
 /// 1 - exp(-x), x >= 0.
@@ -303,21 +304,17 @@ std::size_t Choose(WalkTracer::State& st, std::size_t count) {
         const VF x = hn::LoadU(f, &w.x[i]), y = hn::LoadU(f, &w.y[i]), s = hn::LoadU(f, &w.s[i]);
         const VF weight = hn::LoadU(f, &w.w[i]);
         const VDirection d{hn::Mul(flip, hn::LoadU(f, &w.dx[i])), hn::Mul(flip, hn::LoadU(f, &w.dy[i]))};
-        VF nearest;
-        if (M == Medium::disc) {
-            const VF r = hn::Sqrt(hn::Max(hn::Sub(Constant(1), s), hn::Zero(f)));
-            nearest = hn::Div(s, hn::Add(Constant(1), r));
-        } else {
-            nearest = hn::Min(x, hn::Sub(Constant(2), x));
-        }
         // Light that goes straight on leaves along the peak of the phase function, light that turns by the nearest way.
-        const VF straight = Exp2(hn::Mul(ReachOf<M>(x, y, s, d).ahead, rate)), turned = Exp2(hn::Mul(nearest, rate));
+        // These set chances only, so that rough values do: 1 - r to 20 %, from s = 1 - r^2.
+        const VF nearest = M == Medium::disc ? hn::Mul(s, hn::MulAdd(s, Constant(0.2f), Constant(0.5f)))
+                                             : hn::Min(x, hn::Sub(Constant(2), x));
+        const VF straight = Exp2(hn::Mul(hn::LoadU(f, &w.straight[i]), rate)), turned = Exp2(hn::Mul(nearest, rate));
         const VF escape = hn::Mul(weight, hn::MulAdd(beta, hn::Sub(turned, straight), straight));
         const VF chance = hn::Min(Constant(1), hn::Mul(escape, Constant(1 / st.cell.plan.pay)));
         const MF paid = hn::And(hn::Lt(hn::LoadU(f, &w.chance[i]), chance), hn::FirstN(f, count - i));
-        const VF value = hn::Div(hn::Mul(weight, Constant(st.p_scale)), hn::Max(chance, Constant(1e-30f)));
         const Squeeze squeeze(paid);
-        squeeze.Store(value, &p.weight[out]), squeeze.Store(hn::LoadU(U(), &w.place[i]), &p.place[out]);
+        squeeze.Store(weight, &p.weight[out]), squeeze.Store(chance, &p.chance[out]),
+            squeeze.Store(hn::LoadU(U(), &w.place[i]), &p.place[out]);
         squeeze.Store(x, &p.x[out]), squeeze.Store(y, &p.y[out]), squeeze.Store(s, &p.s[out]);
         squeeze.Store(d.x, &p.far_dx[out]), squeeze.Store(d.y, &p.far_dy[out]);
         out += hn::CountTrue(f, paid);
@@ -337,6 +334,8 @@ void Pay(WalkTracer::State& st, std::size_t count, TracerSums& sums) {
     for (std::size_t i = 0; i < count; i += lanes) {
         const VF x = hn::LoadU(f, &p.x[i]), y = hn::LoadU(f, &p.y[i]);
         const VDirection d{hn::LoadU(f, &p.far_dx[i]), hn::LoadU(f, &p.far_dy[i])};
+        const VF weight = hn::Div(hn::LoadU(f, &p.weight[i]), hn::Max(hn::LoadU(f, &p.chance[i]), Constant(1e-30f)));
+        hn::StoreU(hn::Mul(weight, Constant(st.p_scale)), f, &p.weight[i]);
         const VF place = hn::Mul(Uniform23(hn::LoadU(U(), &p.place[i])), Constant(comb));
         const VF offset = hn::Floor(place);
         hn::StoreU(hn::ConvertTo(I(), offset), I(), &p.offset[i]);
@@ -448,6 +447,8 @@ std::size_t Fly(WalkTracer::State& st, std::uint32_t order, std::uint32_t random
             alive = hn::And(alive, hn::Lt(t, reach.ahead));
             t = hn::Min(t, reach.ahead);
         }
+        // Along the peak of the phase function, which for g < 0 lies behind.
+        const VF straight = st.flip > 0 ? hn::Sub(reach.ahead, t) : hn::Add(reach.behind, t);
         x = hn::MulAdd(t, d.x, x);
         if (M == Medium::disc) {
             y = hn::MulAdd(t, d.y, y);
@@ -463,6 +464,7 @@ std::size_t Fly(WalkTracer::State& st, std::uint32_t order, std::uint32_t random
         if (M == Medium::disc) squeeze.Store(s, &w.s[out]);
         squeeze.Store(d.x, &w.dx[out]), squeeze.Store(d.y, &w.dy[out]);
         squeeze.Store(weight, &w.w[out]), squeeze.Store(chance, &w.chance[out]);
+        squeeze.Store(straight, &w.straight[out]);
         squeeze.Store(index, &w.index[out]), squeeze.Store(reversed, &w.reversed[out]);
         squeeze.Store(words.d, &w.place[out]);
         out += hn::CountTrue(f, alive);

@@ -17,12 +17,13 @@ inline constexpr std::uint32_t kLatticeDims = 25;
 /// Walks of a batch: position, direction, weight. Disc: s = 1 - r^2, kept beside x and y without cancellation.
 /// Slab: x is the depth, y the path length so far.
 struct Walks {
-    std::vector<float> x, y, s, dx, dy, w, chance;  ///< chance: uniform number that decides a payment
-    std::vector<std::uint32_t> index, reversed;     ///< of the walk; its bits in reverse order
-    std::vector<std::uint32_t> place;               ///< random word: where in its bin and comb a deposit lies
+    std::vector<float> x, y, s, dx, dy, w, straight,
+        chance;  ///< straight: way out along the phase function's peak; chance: uniform number that decides a payment
+    std::vector<std::uint32_t> index, reversed;  ///< of the walk; its bits in reverse order
+    std::vector<std::uint32_t> place;            ///< random word: where in its bin and comb a deposit lies
 
     void reserve(std::size_t n) {
-        for (auto* v : {&x, &y, &s, &dx, &dy, &w, &chance}) v->assign(n, 0.0f);
+        for (auto* v : {&x, &y, &s, &dx, &dy, &w, &straight, &chance}) v->assign(n, 0.0f);
         for (auto* v : {&index, &reversed, &place}) v->assign(n, 0u);
     }
 };
@@ -30,14 +31,14 @@ struct Walks {
 /// Vertices to be paid out. "Near" is turned back by the offset in the
 /// bin, "far" by that and the comb's offset.
 struct Payments {
-    std::vector<float> weight, x, y, s, far_x, far_y, far_dx, far_dy, near_x, near_y, near_dx, near_dy, cos_far,
+    std::vector<float> weight, chance, x, y, s, far_x, far_y, far_dx, far_dy, near_x, near_y, near_dx, near_dy, cos_far,
         sin_far, cos_near, sin_near;
     std::vector<std::int32_t> offset, window;
     std::vector<std::uint32_t> place;
 
     void reserve(std::size_t n) {
-        for (auto* v : {&weight, &x, &y, &s, &far_x, &far_y, &far_dx, &far_dy, &near_x, &near_y, &near_dx, &near_dy,
-                        &cos_far, &sin_far, &cos_near, &sin_near})
+        for (auto* v : {&weight, &chance, &x, &y, &s, &far_x, &far_y, &far_dx, &far_dy, &near_x, &near_y, &near_dx,
+                        &near_dy, &cos_far, &sin_far, &cos_near, &sin_near})
             v->assign(n, 0.0f);
         for (auto* v : {&offset, &window}) v->assign(n, 0);
         place.assign(n, 0u);

@@ -8,6 +8,8 @@
 #include "sim2d/random.hpp"
 #include "sim2d/tracer_state.hpp"
 
+// Lanes are kept in structs, which vectors without a size cannot be.
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sim2d/tracer_kernel.cpp"
 #include "hwy/foreach_target.h"

@@ -10,7 +10,7 @@
 
 #include "sim2d/disc_grid.hpp"
 #include "sim2d/disc_single.hpp"
-#include "sim2d/disc_transport.hpp"
+#include "sim2d/disc_solve.hpp"
 
 namespace medulla::sim2d {
 namespace {
@@ -80,12 +80,15 @@ DiscGridSize automatic(double sigma, double g, const DiscOptions& options) {
     DiscGridSize size;
     size.circles = options.circles > 0 ? options.circles : 18 + static_cast<int>(8 * std::min(root, 8.0));
     size.gap = options.gap > 0 ? options.gap : std::clamp(0.7 * width * (1 + sigma / 8), 0.03, 0.25);
+    size.rim = options.rim > 0 ? options.rim : 0.5 * width;
     const double modes = 23 + 5 * std::min(root, 8.0) + 2.3 * std::min(1 / width, 40.0);
     size.modes = options.modes > 0 ? options.modes : static_cast<int>(modes / 8) * 8 + 7;
     return size;
 }
 
-DiscGridSize coarser(const DiscGridSize& size) { return {size.circles * 2 / 3, size.modes * 3 / 4, size.gap * 1.3}; }
+DiscGridSize coarser(const DiscGridSize& size) {
+    return {size.circles * 2 / 3, size.modes * 3 / 4, size.gap * 1.5, size.rim * 1.5};
+}
 
 /// The error of a grid falls about as the third power of the radial step and the fifth of the gap: what the coarse grid
 /// misses is 1.5^3 (1.3^5) times what the fine one does, so fine + (fine - coarse) / (1.5^3 - 1) cancels most of it.
@@ -100,11 +103,11 @@ struct DiscSolver::Shared {
     double g;
     DiscOptions options;
     std::mutex mutex;
-    std::map<std::tuple<int, int, double>, std::shared_ptr<const DiscGrid>> grids;
+    std::map<std::tuple<int, int, double, double>, std::shared_ptr<const DiscGrid>> grids;
 
     std::shared_ptr<const DiscGrid> grid(const DiscGridSize& size) {
         const std::lock_guard<std::mutex> lock(mutex);
-        auto& entry = grids[{size.circles, size.modes, size.gap}];
+        auto& entry = grids[{size.circles, size.modes, size.gap, size.rim}];
         if (!entry) entry = std::make_shared<const DiscGrid>(g, size);
         return entry;
     }
@@ -131,8 +134,8 @@ std::vector<Profile> DiscSolver::solve(double sigma, const std::vector<double>& 
     const double width = 2 * pi / static_cast<double>(bins);
     DiscExit fine, coarse;
     const bool two_grids = shared_->options.estimate_error && sigma > 0;
-    if (sigma > 0) fine = solve_disc_transport(*shared_->grid(size), sigma);
-    if (two_grids) coarse = solve_disc_transport(*shared_->grid(coarser(size)), sigma);
+    if (sigma > 0) fine = solve_disc_transport(*shared_->grid(size), sigma, 0, 2e-5);
+    if (two_grids) coarse = solve_disc_transport(*shared_->grid(coarser(size)), sigma, 0, 2e-5);
     const double ahead = extrapolation(sigma, shared_->g);
     std::vector<Profile> profiles;
     for (const double offset : h) {

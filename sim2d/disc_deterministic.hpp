@@ -16,6 +16,7 @@ struct DiscOptions {
     int circles = 0;             ///< of the fine grid, >= 6
     int modes = 0;               ///< highest k in exp(i k alpha) on the fine grid, >= 8
     double gap = 0;              ///< largest gap between grazing directions on the fine grid [radians], > 0
+    double rim = 0;              ///< step of acos(radius) from the rim inwards on the fine grid [radians], > 0
     bool estimate_error = true;  ///< solve a second, coarser grid: error estimate and extrapolation
 };
 

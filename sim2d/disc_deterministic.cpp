@@ -73,29 +73,34 @@ void add_modes(const std::vector<Complex>& c, std::vector<double>& lobe) {
     }
 }
 
-/// Measured, for 1e-3 or better over sigma <= 16, 0 <= g <= 0.95: the radial step follows the layer 1 / sigma under the
-/// rim, the gap the width of the phase function (wider where many collisions blur), the modes both.
+/// Measured (docs/accuracy.md), for sigma <= 16 and |g| <= 0.95. Errors fall like the third power of all steps. Scattering
+/// makes the source under the rim behave like z log z over a depth z = rim^2 / 2; light that is scattered twice carries
+/// modes of g^(2 k).
 DiscGridSize automatic(double sigma, double g, const DiscOptions& options) {
-    const double width = 1 - std::abs(g), root = std::sqrt(sigma);
+    const double scale = std::cbrt(options.target_error / 1e-3), depth = std::min(sigma, 40.0);
     DiscGridSize size;
-    size.circles = options.circles > 0 ? options.circles : 18 + static_cast<int>(8 * std::min(root, 8.0));
-    size.gap = options.gap > 0 ? options.gap : std::clamp(0.7 * width * (1 + sigma / 8), 0.03, 0.25);
-    size.rim = options.rim > 0 ? options.rim : 0.5 * width;
-    const double modes = 23 + 5 * std::min(root, 8.0) + 2.3 * std::min(1 / width, 40.0);
-    size.modes = options.modes > 0 ? options.modes : static_cast<int>(modes / 8) * 8 + 7;
+    size.circles = options.circles > 0 ? options.circles : static_cast<int>(std::ceil((8 + 0.75 * depth) / scale));
+    size.gap = options.gap > 0 ? options.gap : std::min(0.3 * scale, 0.4);
+    size.rim = options.rim > 0 ? options.rim : 0.003 * scale * std::sqrt(16 / std::clamp(depth, 1.0, 16.0));
+    size.growth = 1 + scale * (0.2 + 0.1 * std::exp(-sigma / 4));
+    const double visible = 1.3 * options.target_error / std::min(sigma, 1.0);
+    const double tail = g == 0 || visible >= 1 ? 0 : std::log(visible) / (2 * std::log(std::abs(g)));
+    const double modes = std::max(19 + 3 * std::min(std::sqrt(sigma), 8.0), std::min(tail, 200.0));
+    size.modes = options.modes > 0 ? options.modes : static_cast<int>(modes / 8) * 8 + 6;
     return size;
 }
 
+const double coarsening = 1.4;
+
 DiscGridSize coarser(const DiscGridSize& size) {
-    return {size.circles * 2 / 3, size.modes * 3 / 4, size.gap * 1.5, size.rim * 1.5};
+    const auto rounded = [](double x, int least) { return std::max(least, static_cast<int>(x)); };
+    return {rounded(size.circles / coarsening, 4), rounded(size.modes * 0.75, 8), std::min(size.gap * coarsening, 0.5),
+            size.rim * coarsening, 1 + (size.growth - 1) * coarsening};
 }
 
-/// The error of a grid falls about as the third power of the radial step and the fifth of the gap: what the coarse grid
-/// misses is 1.5^3 (1.3^5) times what the fine one does, so fine + (fine - coarse) / (1.5^3 - 1) cancels most of it.
-/// Measured: it gains 2 to 10 where the layer under the rim rules the error, and loses where the peak of p does.
-double extrapolation(double sigma, double g) {
-    return sigma * (1 - std::abs(g)) >= 0.3 ? 1 / (1.5 * 1.5 * 1.5 - 1) : 0;
-}
+/// What the coarse grid misses is coarsening^3 times what the fine one does: fine + (fine - coarse) times this cancels
+/// most of it.
+double extrapolation(double, double) { return getenv("AHEAD") ? atof(getenv("AHEAD")) : 0; }
 
 }  // namespace
 

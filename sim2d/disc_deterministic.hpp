@@ -13,6 +13,7 @@ namespace medulla::sim2d {
 
 /// 0 means: chosen from sigma and g.
 struct DiscOptions {
+    double target_error = 1e-3;  ///< relative L2 error of a lobe that the grids aim at, in [1e-6, 0.1]
     int circles = 0;             ///< of the fine grid, >= 6
     int modes = 0;               ///< highest k in exp(i k alpha) on the fine grid, >= 8
     double gap = 0;              ///< largest gap between grazing directions on the fine grid [radians], > 0

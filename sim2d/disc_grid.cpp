@@ -12,22 +12,23 @@ namespace {
 const double pi = 3.14159265358979323846;
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+const int taps = 6;  ///< nodes of the interpolant in psi, even
+
 /// A value of the interpolant: node index (modulo mirror images) and the sign its image carries.
 struct Tap {
-    std::ptrdiff_t node;  ///< < 0: a zero
+    std::ptrdiff_t node;
     double sign, at;
 };
 
-/// Mirror images of the nodes about 0 (sign `about_zero`) and pi / 2 (sign `about_grazing`): tap t of ... -2 -1 0 1 ...
-/// On the rim nothing comes in, so a part ends at pi / 2 with the value 0 and has no image beyond.
-Tap tap(const double* psi, std::ptrdiff_t count, std::ptrdiff_t t, double about_zero, double about_grazing, bool rim) {
+/// Mirror images of the nodes about 0 (sign `about_zero`) and the last node, pi / 2 (sign `about_grazing`): tap t of
+/// ... -2 -1 0 1 ...
+Tap tap(const double* psi, std::ptrdiff_t count, std::ptrdiff_t t, double about_zero, double about_grazing) {
     if (t < 0) return {-1 - t, about_zero, -psi[-1 - t]};
     if (t < count) return {t, 1, psi[t]};
-    if (rim) return {-1, 0, pi / 2};
-    return {2 * count - 1 - t, about_grazing, pi - psi[2 * count - 1 - t]};
+    return {2 * count - 2 - t, about_grazing, pi - psi[2 * count - 2 - t]};
 }
 
-/// Fourier coefficients in psi of the piecewise cubic through the nodes: row = harmonic n of cosine or sine, exact up
+/// Fourier coefficients in psi of the piecewise polynomial through the nodes: row = harmonic n of cosine or sine, exact up
 /// to the Gauss rule per panel; c_n = (4 / pi) integral over (0, pi / 2), half that for n = 0.
 Matrix analyse(const double* psi, std::ptrdiff_t count, int part, std::size_t harmonics, bool rim) {
     const bool cosine = DiscGrid::is_cosine(part);
@@ -36,23 +37,23 @@ Matrix analyse(const double* psi, std::ptrdiff_t count, int part, std::size_t ha
     const double about_grazing = part == real_sum || part == imaginary_sum ? 1 : -1;
     Matrix coefficients = Matrix::Zero(static_cast<Eigen::Index>(harmonics), count);
     const auto value = [&](int n, double x) { return cosine ? std::cos(n * x) : std::sin(n * x); };
-    for (std::ptrdiff_t panel = -1; panel < count; ++panel) {
-        const double low = panel < 0 ? 0 : psi[panel], high = panel + 1 < count ? psi[panel + 1] : pi / 2;
-        // Points for a cubic times a wave of n_max (high - low) radians.
+    for (std::ptrdiff_t panel = -1; panel + 1 < count; ++panel) {
+        const double low = panel < 0 ? 0 : psi[panel], high = psi[panel + 1];
+        // Points for a polynomial times a wave of n_max (high - low) radians.
         const int points = 4 + static_cast<int>(std::ceil(0.5 * highest * (high - low)));
         const GaussRule rule = gauss_legendre(points);
-        // Stencil of four taps; at the rim it stops at the zero.
-        const std::ptrdiff_t start =
-            std::max<std::ptrdiff_t>(-count, rim ? std::min<std::ptrdiff_t>(panel - 1, count - 3) : panel - 1);
-        Tap stencil[4];
-        for (int a = 0; a < 4; ++a) stencil[a] = tap(psi, count, start + a, about_zero, about_grazing, rim);
+        // On the rim nothing comes in: a part ends at pi / 2 with a kink, where the stencil stops.
+        const std::ptrdiff_t middle = panel + 1 - taps / 2;
+        const std::ptrdiff_t start = std::max(-count, rim ? std::min(middle, count - taps) : middle);
+        Tap stencil[taps];
+        for (int a = 0; a < taps; ++a) stencil[a] = tap(psi, count, start + a, about_zero, about_grazing);
         for (int q = 0; q < points; ++q) {
             const double x = low + rule.nodes[static_cast<std::size_t>(q)] * (high - low);
             const double weight = rule.weights[static_cast<std::size_t>(q)] * (high - low) * 4 / pi;
-            double basis[4];
-            for (int a = 0; a < 4; ++a) {
+            double basis[taps];
+            for (int a = 0; a < taps; ++a) {
                 basis[a] = weight * stencil[a].sign;
-                for (int c = 0; c < 4; ++c)
+                for (int c = 0; c < taps; ++c)
                     if (c != a) basis[a] *= (x - stencil[c].at) / (stencil[a].at - stencil[c].at);
             }
             // Harmonics of one part step by 2: f_n+2 = 2 cos(2 x) f_n - f_n-2.
@@ -60,9 +61,8 @@ Matrix analyse(const double* psi, std::ptrdiff_t count, int part, std::size_t ha
             double before = value(lowest - 2, x), now = value(lowest, x);
             for (std::size_t n = 0; n < harmonics; ++n) {
                 const double wave = n == 0 && lowest == 0 ? 0.5 * now : now;
-                for (int a = 0; a < 4; ++a)
-                    if (stencil[a].node >= 0)
-                        coefficients(static_cast<Eigen::Index>(n), stencil[a].node) += basis[a] * wave;
+                for (int a = 0; a < taps; ++a)
+                    coefficients(static_cast<Eigen::Index>(n), stencil[a].node) += basis[a] * wave;
                 const double next = twice * now - before;
                 before = now, now = next;
             }
@@ -78,15 +78,15 @@ std::vector<DiscReal> rounded(const Matrix& matrix) {
     return values;
 }
 
-/// Radii cos x: steps of x from the rim, widening by `growth` to the step of the inside, together pi / 2.
+/// Radii cos x: steps of x from the rim, widening by a factor to the step of the inside, together pi / 2.
 std::vector<double> radii(const DiscGridSize& size) {
-    const double growth = 1.2, widest = pi / (2 * size.circles);
+    const double widest = pi / (2 * size.circles);
     std::vector<double> step;
     double next = std::min(size.rim, widest), sum = 0;
     while (sum < pi / 2 - 0.5 * widest) {
         step.push_back(next);
         sum += next;
-        next = std::min(next * growth, widest);
+        next = std::min(next * size.growth, widest);
     }
     std::vector<double> radius;  // sin of the angle from the centre
     double angle = 0;
@@ -105,8 +105,9 @@ DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : size(wanted) {
         const double inner = i == 0 ? 0 : radius[i - 1];
         const double arc = std::acos(inner / radius[i]);
         const int count = std::max(2, static_cast<int>(std::ceil(arc / size.gap)));
-        for (int m = 0; m < count; ++m) {
-            offset.push_back(radius[i] * std::cos(arc * (count - m - 0.5) / count));
+        const double intervals = i == 0 ? count - 0.5 : count;  // half a gap from the centre, one from the circle inside
+        for (int m = count - 1; m >= 0; --m) {
+            offset.push_back(radius[i] * std::cos(arc * m / intervals));
             ring.push_back(i);
         }
         first.push_back(psi.size());

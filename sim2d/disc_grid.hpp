@@ -8,12 +8,14 @@
 
 namespace medulla::sim2d {
 
-/// Which grid. Circles r_i = cos x_i: x grows from the rim, in steps that begin at `rim` and widen to pi / (2 circles).
+/// Which grid. Circles r_i = cos x_i: x grows from the rim, in steps that begin at `rim` and widen by
+/// `growth` each up to pi / (2 circles).
 /// The ring between two circles holds chords that are uniform in angle on its outer circle, 2 at least and no further
-/// apart than `gap`.
+/// apart than `gap`; the last touches the outer circle.
 struct DiscGridSize {
     int circles = 0, modes = 0;
     double gap = 0, rim = 0;  ///< [radians]
+    double growth = 1.2;
 };
 
 /// A field I(r, alpha, omega) = sum over k of exp(i k omega) I_k(r, psi), psi = alpha - omega: at a fixed direction it
@@ -37,7 +39,7 @@ class DiscGrid {
     std::vector<double> offset;          ///< b of chord m, increasing; chords [0, chords(i)) meet circle i
     std::vector<std::size_t> ring;       ///< first circle that chord m meets
     std::vector<std::size_t> first;      ///< first[i] + m: node of circle i on chord m; first[circles] = node count
-    std::vector<double> psi;             ///< per node, in (0, pi / 2)
+    std::vector<double> psi;             ///< per node, in (0, pi / 2]
     std::size_t stride;                  ///< columns: path length, then modes 0, 1, ..; a multiple of 8
     int reach;                           ///< highest m: |g|^|m - k| < 1e-7 beyond, for every k
 
@@ -45,7 +47,8 @@ class DiscGrid {
     static std::size_t mode_of(std::size_t column) { return column == 0 ? 0 : column - 1; }
     std::size_t circles() const { return radius.size(); }
     std::size_t nodes() const { return psi.size(); }
-    /// Number of chords that meet circle i; circle i has as many nodes with psi < pi / 2.
+    bool tangent(std::size_t m) const { return offset[m] == radius[ring[m]]; }
+    /// Number of chords that meet circle i; circle i has as many nodes with psi <= pi / 2.
     std::size_t chords(std::size_t i) const { return first[i + 1] - first[i]; }
     /// Harmonics m = 2 j + parity(part), j < harmonics(i), are kept of a field on circle i: as many as it has nodes.
     std::size_t harmonics(std::size_t i) const { return std::min(chords(i), all_harmonics()); }

@@ -52,15 +52,14 @@ DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a
     exit.residual = many.residual;
     exit.offset = grid.offset;
     exit.modes = stride - 1;
-    for (std::size_t m = 0; m < grid.offset.size(); ++m) {
+    for (std::size_t m = 0; m + 1 < grid.offset.size(); ++m) {
         const double collided = disc_energy(extinction, grid.offset[m]) / extinction;  // F / sigma
         const DiscReal *re = &rows[2 * m * stride], *im = re + stride;
         exit.rest.push_back(static_cast<double>(re[0]) / collided);
         for (std::size_t k = 1; k < stride; ++k)
             exit.lobes.push_back(sigma / collided * std::complex<double>(re[k], im[k]));
     }
-    // Tangent chord: I / F -> J(r = 1, psi = pi / 2) / sigma.
-    exit.offset.push_back(1);
+    // The last chord is the tangent: I / F -> J(r = 1, psi = pi / 2) / sigma.
     exit.rest.push_back(transport.grazing(many.solution, 0).real());
     for (std::size_t k = 1; k < stride; ++k) exit.lobes.push_back(sigma * transport.grazing(many.solution, k));
     return exit;

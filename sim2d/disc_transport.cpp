@@ -69,7 +69,7 @@ DiscTransport::DiscTransport(const DiscGrid& grid, double extinction) : grid_(gr
         const double b = grid.offset[m];
         const auto along = [&](std::size_t i) { return std::sqrt((grid.radius[i] - b) * (grid.radius[i] + b)); };
         for (std::size_t i = grid.circles(); i-- > grid.ring[m];) s.push_back(-along(i));
-        for (std::size_t i = grid.ring[m]; i < grid.circles(); ++i) s.push_back(along(i));
+        for (std::size_t i = grid.ring[m] + grid.tangent(m); i < grid.circles(); ++i) s.push_back(along(i));
         cells_.push_back(chord_cells(s));
     }
     along_.resize(4 * grid.circles() * grid.stride);
@@ -152,27 +152,16 @@ void DiscTransport::uniform_radiance(DiscField& radiance) const {
         }
 }
 
-/// A source is smooth at the rim, its sum parts are even about pi / 2 and its difference parts 0: a cubic in
-/// (pi / 2 - psi)^2.
 std::complex<double> DiscTransport::grazing(const DiscField& source, std::size_t column) const {
-    const std::size_t i = grid_.circles() - 1, count = grid_.chords(i);
-    std::complex<double> value = 0;
-    for (std::size_t a = count - 4; a < count; ++a) {
-        double weight = 1;
-        const double x = 0.5 * pi - grid_.psi[grid_.first[i] + a];
-        for (std::size_t c = count - 4; c < count; ++c) {
-            const double y = 0.5 * pi - grid_.psi[grid_.first[i] + c];
-            if (c != a) weight *= y * y / ((y - x) * (y + x));
-        }
-        value += weight * std::complex<double>(source[row(i, real_sum, a) * grid_.stride + column],
-                                               source[row(i, imaginary_sum, a) * grid_.stride + column]);
-    }
-    return value;
+    const std::size_t i = grid_.circles() - 1, last = grid_.chords(i) - 1;
+    return {source[row(i, real_sum, last) * grid_.stride + column],
+            source[row(i, imaginary_sum, last) * grid_.stride + column]};
 }
 
 void DiscTransport::chord(std::size_t m, const DiscField& source, DiscField& radiance, std::size_t active,
                           DiscReal* exit) {
     const std::size_t ring = grid_.ring[m], met = grid_.circles() - ring, stride = grid_.stride;
+    const std::size_t out = met - grid_.tangent(m);  // the point of touch is both on the way in and on the way out
     const auto at = [&](std::size_t p, int imaginary) {
         return &along_[(2 * p + static_cast<std::size_t>(imaginary)) * stride];
     };
@@ -181,11 +170,10 @@ void DiscTransport::chord(std::size_t m, const DiscField& source, DiscField& rad
         for (int part = 0; part < 2; ++part)
             lanes::sum_difference(&source[row(ring + c, sums[part], m) * stride],
                                   &source[row(ring + c, differences[part], m) * stride], DiscReal(1),
-                                  at(met + c, part), at(met - 1 - c, part), active);
+                                  at(out + c, part), at(met - 1 - c, part), active);
     // March from the rim, where nothing comes in. The radiance on the way in waits in the sum rows for the way out.
     std::fill(flux_.begin(), flux_.end(), DiscReal(0));
-    for (std::size_t p = 0; p < 2 * met; ++p) {
-        const std::size_t i = p < met ? grid_.circles() - 1 - p : ring + (p - met);
+    for (std::size_t p = 0; p < out + met; ++p) {
         for (int part = 0; part < 2; ++part) {
             DiscReal* flux = &flux_[static_cast<std::size_t>(part) * stride];
             if (p > 0) {
@@ -193,12 +181,13 @@ void DiscTransport::chord(std::size_t m, const DiscField& source, DiscField& rad
                 lanes::advance(flux, cell.transmission, cell.weight, at(cell.start, part), 2 * stride, cell.taps,
                                active);
             }
-            DiscReal* sum = &radiance[row(i, sums[part], m) * stride];
             if (p < met)
-                std::copy_n(flux, active, sum);
-            else
-                lanes::sum_difference(flux, sum, DiscReal(0.5), sum, &radiance[row(i, differences[part], m) * stride],
-                                      active);
+                std::copy_n(flux, active, &radiance[row(grid_.circles() - 1 - p, sums[part], m) * stride]);
+            if (p >= out) {
+                DiscReal* sum = &radiance[row(ring + p - out, sums[part], m) * stride];
+                lanes::sum_difference(flux, sum, DiscReal(0.5), sum,
+                                      &radiance[row(ring + p - out, differences[part], m) * stride], active);
+            }
         }
     }
     if (exit) std::copy(flux_.begin(), flux_.end(), exit + 2 * m * stride);

@@ -64,6 +64,33 @@ double share_error(double hits, double n) {
     return std::sqrt(q * (1 - q) / n);
 }
 
+/// The same for paths of weight w <= 1 in a medium that absorbs: sums of w, w^2 and w times the length.
+struct Weights {
+    explicit Weights(std::size_t bins) : sum(bins, 0), square(bins, 0) {}
+    std::vector<double> sum, square;
+    double total = 0, squares = 0, length = 0, paths = 0;
+
+    void add(std::size_t b, double path_length, double w) {
+        sum[b] += w, square[b] += w * w;
+        total += w, squares += w * w, length += w * path_length, ++paths;
+    }
+
+    Profile profile(double width) const {
+        Profile p;
+        p.standard_error = 1;
+        if (!(total > 0)) return p;
+        double variance = 0, norm = 0;
+        for (std::size_t b = 0; b < sum.size(); ++b) {
+            p.lobe.push_back(sum[b] / (total * width));
+            variance += square[b] - sum[b] * sum[b] / paths;
+            norm += sum[b] * sum[b];
+        }
+        p.standard_error = std::sqrt(variance / norm);
+        p.mean_length = length / total;
+        return p;
+    }
+};
+
 struct Counts {
     explicit Counts(std::size_t bins) : bin(bins, 0) {}
     std::vector<std::uint64_t> bin;
@@ -113,10 +140,12 @@ Profile trace_disc(double sigma, double g, double h, std::size_t bins, const Tra
     check(sigma, g, bins, options);
     require(h >= -1 && h <= 1, "h: expected a value in [-1, 1]");
     const double half = std::sqrt((1 - h) * (1 + h)), chord = 2 * half;
+    require(std::isfinite(options.absorption) && options.absorption >= 0, "absorption: expected a finite value >= 0");
     Counts counts(bins);
+    Weights weights(bins);
+    const bool absorbs = options.absorption > 0, forced = options.first == FirstCollision::forced;
     for (std::uint64_t path = 0; path < options.paths; ++path) {
         RandomStream random(options.seed, options.cell, path);
-        const bool forced = options.first == FirstCollision::forced;
         const double t = forced ? forced_flight(sigma, chord, random) : free_flight(sigma, random);
         if (!forced && !(t < chord)) continue;  // unscattered: not in the table
         Ray ray{-half, h, {1, 0}};
@@ -124,11 +153,25 @@ Profile trace_disc(double sigma, double g, double h, std::size_t bins, const Tra
         scatter(ray, g, random);
         const Exit exit = walk_disc(ray, sigma, g, random);
         const double phi = std::atan2(exit.ray.direction.y, exit.ray.direction.x);
-        counts.add(bin_of(phi, -pi, pi, bins), t + exit.length);
+        const std::size_t bin = bin_of(phi, -pi, pi, bins);
+        const double length = t + exit.length;
+        if (absorbs)
+            weights.add(bin, length, std::exp(-options.absorption * length));
+        else
+            counts.add(bin, length);
     }
-    Profile profile = counts.profile(2 * pi / static_cast<double>(bins));
+    const double width = 2 * pi / static_cast<double>(bins);
+    if (absorbs) {
+        Profile profile = weights.profile(width);
+        const auto n = static_cast<double>(options.paths);
+        const double mean = weights.total / n, scale = forced ? -std::expm1(-sigma * chord) : 1;
+        profile.energy = scale * mean;
+        profile.energy_error = scale * std::sqrt(std::max(0.0, weights.squares / n - mean * mean) / n);
+        return profile;
+    }
+    Profile profile = counts.profile(width);
     profile.energy = -std::expm1(-sigma * chord);
-    if (options.first == FirstCollision::analog) {
+    if (!forced) {
         const auto n = static_cast<double>(options.paths);
         profile.energy = static_cast<double>(counts.total) / n;
         profile.energy_error = share_error(static_cast<double>(counts.total), n);

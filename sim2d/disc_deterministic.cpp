@@ -7,6 +7,7 @@
 #include <mutex>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 
 #include "sim2d/disc_grid.hpp"
 #include "sim2d/disc_single.hpp"
@@ -22,35 +23,58 @@ void require(bool condition, const char* what) {
     if (!condition) throw std::invalid_argument(what);
 }
 
-/// Coefficients c_k / E at the offset h, by a polynomial in asin h through the eight nearest chords, those of -h
-/// included: I(-b, -phi) = I(b, phi). Near |h| = 1 the stencil ends at the tangent chord.
-std::vector<Complex> at_offset(const DiscExit& exit, double h) {
-    const std::size_t count = exit.offset.size(), taps = std::min<std::size_t>(8, 2 * count);
-    // Chord t of -count .. count - 1: mirrored for t < 0.
+/// Polynomial in asin h through the eight nearest chords, those of -h included: chord t of -count .. count - 1 is
+/// mirrored for t < 0. Near |h| = 1 the stencil ends at the tangent chord.
+struct Stencil {
+    std::ptrdiff_t start;
+    std::vector<double> weight;
+
+    static std::size_t chord(std::ptrdiff_t t) { return static_cast<std::size_t>(t < 0 ? -1 - t : t); }
+};
+
+Stencil stencil_at(const std::vector<double>& offset, double h) {
+    const std::size_t count = offset.size(), taps = std::min<std::size_t>(8, 2 * count);
     const auto beta = [&](std::ptrdiff_t t) {
-        return t < 0 ? -std::asin(exit.offset[static_cast<std::size_t>(-1 - t)])
-                     : std::asin(exit.offset[static_cast<std::size_t>(t)]);
+        return t < 0 ? -std::asin(offset[Stencil::chord(t)]) : std::asin(offset[Stencil::chord(t)]);
     };
     const double x = std::asin(std::abs(h));
-    const auto above = std::upper_bound(exit.offset.begin(), exit.offset.end(), std::abs(h)) - exit.offset.begin();
-    const auto start = std::min<std::ptrdiff_t>(above - static_cast<std::ptrdiff_t>(taps / 2),
-                                                static_cast<std::ptrdiff_t>(count - taps));
-    std::vector<Complex> c(exit.modes);
+    const auto above = std::upper_bound(offset.begin(), offset.end(), std::abs(h)) - offset.begin();
+    Stencil s;
+    s.start = std::min<std::ptrdiff_t>(above - static_cast<std::ptrdiff_t>(taps / 2),
+                                       static_cast<std::ptrdiff_t>(count - taps));
     for (std::size_t a = 0; a < taps; ++a) {
-        const std::ptrdiff_t t = start + static_cast<std::ptrdiff_t>(a);
+        const std::ptrdiff_t t = s.start + static_cast<std::ptrdiff_t>(a);
         double weight = 1;
         for (std::size_t o = 0; o < taps; ++o)
-            if (const std::ptrdiff_t u = start + static_cast<std::ptrdiff_t>(o); u != t)
+            if (const std::ptrdiff_t u = s.start + static_cast<std::ptrdiff_t>(o); u != t)
                 weight *= (x - beta(u)) / (beta(t) - beta(u));
-        const std::size_t chord = static_cast<std::size_t>(t < 0 ? -1 - t : t);
+        s.weight.push_back(weight);
+    }
+    return s;
+}
+
+/// What leaves at the offset h, over the energy of the first collisions: I(-b, -phi) = I(b, phi).
+struct Light {
+    std::vector<Complex> c;
+    double rest = 0;  ///< mean path after the first collision
+};
+
+Light at_offset(const DiscExit& exit, double h) {
+    const Stencil stencil = stencil_at(exit.offset, h);
+    Light light;
+    light.c.resize(exit.modes);
+    for (std::size_t a = 0; a < stencil.weight.size(); ++a) {
+        const std::ptrdiff_t t = stencil.start + static_cast<std::ptrdiff_t>(a);
+        const std::size_t chord = Stencil::chord(t);
+        light.rest += stencil.weight[a] * exit.rest[chord];
         for (std::size_t k = 0; k < exit.modes; ++k) {
             const Complex value = exit.lobes[chord * exit.modes + k];
-            c[k] += weight * (t < 0 ? std::conj(value) : value);
+            light.c[k] += stencil.weight[a] * (t < 0 ? std::conj(value) : value);
         }
     }
     if (h < 0)
-        for (Complex& value : c) value = std::conj(value);
-    return c;
+        for (Complex& value : light.c) value = std::conj(value);
+    return light;
 }
 
 /// Adds the bin averages of c_0 + 2 Re sum c_k exp(i k phi) to a lobe: mode k is damped by sinc(k w / 2).
@@ -76,16 +100,16 @@ void add_modes(const std::vector<Complex>& c, std::vector<double>& lobe) {
 /// Measured (docs/accuracy.md), for sigma <= 16 and |g| <= 0.95. Errors fall like the third power of all steps. Scattering
 /// makes the source under the rim behave like z log z over a depth z = rim^2 / 2; light that is scattered twice carries
 /// modes of g^(2 k).
-DiscGridSize automatic(double sigma, double g, const DiscOptions& options) {
-    const double scale = std::cbrt(options.target_error / 1e-3), depth = std::min(sigma, 40.0);
+DiscGridSize automatic(double sigma, double sigma_a, double g, const DiscOptions& options) {
+    const double scale = std::cbrt(options.target_error / 1e-3), depth = std::min(sigma + sigma_a, 40.0);
     DiscGridSize size;
-    size.circles = options.circles > 0 ? options.circles : static_cast<int>(std::ceil((8 + 0.75 * depth) / scale));
+    size.circles = options.circles > 0 ? options.circles : static_cast<int>(std::ceil((8 + depth) / scale));
     size.gap = options.gap > 0 ? options.gap : std::min(0.3 * scale, 0.4);
     size.rim = options.rim > 0 ? options.rim : 0.003 * scale * std::sqrt(16 / std::clamp(depth, 1.0, 16.0));
-    size.growth = 1 + scale * (0.2 + 0.1 * std::exp(-sigma / 4));
-    const double visible = 1.3 * options.target_error / std::min(sigma, 1.0);
+    size.growth = 1 + scale * (0.17 + 0.13 * std::exp(-depth / 4));
+    const double visible = 0.6 * options.target_error / std::min(sigma, 1.0);
     const double tail = g == 0 || visible >= 1 ? 0 : std::log(visible) / (2 * std::log(std::abs(g)));
-    const double modes = std::max(19 + 3 * std::min(std::sqrt(sigma), 8.0), std::min(tail, 200.0));
+    const double modes = std::max(19 + 4 * std::min(std::sqrt(sigma), 8.0), std::min(tail, 200.0));
     size.modes = options.modes > 0 ? options.modes : static_cast<int>(modes / 8) * 8 + 6;
     return size;
 }
@@ -98,9 +122,16 @@ DiscGridSize coarser(const DiscGridSize& size) {
             size.rim * coarsening, 1 + (size.growth - 1) * coarsening};
 }
 
-/// What the coarse grid misses is coarsening^3 times what the fine one does: fine + (fine - coarse) times this cancels
-/// most of it.
-double extrapolation(double, double) { return getenv("AHEAD") ? atof(getenv("AHEAD")) : 0; }
+/// Third order: a coarse grid misses coarsening^3 times what the fine one does. Error of the fine grid over the
+/// difference of the two.
+const double share = 1 / (coarsening * coarsening * coarsening - 1);
+
+/// Mean of t over the first collisions exp(-extinction t) on a chord: length (1 / tau - 1 / (exp(tau) - 1)).
+double mean_first_flight(double extinction, double length) {
+    const double tau = extinction * length;
+    if (tau < 0.3) return length * (0.5 - tau / 12 * (1 - tau * tau / 60 * (1 - tau * tau / 42)));
+    return length * (1 / tau - 1 / std::expm1(tau));
+}
 
 }  // namespace
 
@@ -122,6 +153,8 @@ DiscSolver::DiscSolver(double g, const DiscOptions& options) : shared_(std::make
     require(g > -1 && g < 1, "g: expected a value in (-1, 1)");
     require(options.circles == 0 || options.circles >= 6, "circles: expected at least 6, or 0");
     require(options.modes == 0 || options.modes >= 8, "modes: expected at least 8, or 0");
+    require(options.target_error >= 1e-6 && options.target_error <= 0.1, "target_error: expected 1e-6 to 0.1");
+    require(options.rim >= 0, "rim: expected an angle > 0, or 0");
     require(options.gap >= 0, "gap: expected an angle > 0, or 0");
     shared_->g = g;
     shared_->options = options;
@@ -132,44 +165,62 @@ DiscSolver::DiscSolver(DiscSolver&&) noexcept = default;
 DiscSolver& DiscSolver::operator=(DiscSolver&&) noexcept = default;
 
 std::vector<Profile> DiscSolver::solve(double sigma, const std::vector<double>& h, std::size_t bins) const {
+    return solve(sigma, 0, h, bins);
+}
+
+std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::vector<double>& h,
+                                       std::size_t bins) const {
     require(std::isfinite(sigma) && sigma >= 0, "sigma: expected a finite value >= 0");
+    require(std::isfinite(sigma_a) && sigma_a >= 0, "sigma_a: expected a finite value >= 0");
     require(bins > 0, "bins: expected at least one");
     for (const double offset : h) require(offset >= -1 && offset <= 1, "h: expected a value in [-1, 1]");
-    const DiscGridSize size = automatic(sigma, shared_->g, shared_->options);
+    const double extinction = sigma + sigma_a;
+    const DiscGridSize size = automatic(sigma, sigma_a, shared_->g, shared_->options);
     const double width = 2 * pi / static_cast<double>(bins);
-    DiscExit fine, coarse;
-    const bool two_grids = shared_->options.estimate_error && sigma > 0;
-    if (sigma > 0) fine = solve_disc_transport(*shared_->grid(size), sigma, 0, 2e-5);
-    if (two_grids) coarse = solve_disc_transport(*shared_->grid(coarser(size)), sigma, 0, 2e-5);
-    const double ahead = extrapolation(sigma, shared_->g);
+    // Everything is divided by the energy of the first collisions, so a limit sigma -> 0 is a solve at a sigma that
+    // adds nothing to it in double precision.
+    const double visible = std::max(sigma, 1e-30), tolerance = 0.02 * std::min(shared_->options.target_error, 1e-3);
+    const bool two_grids = shared_->options.estimate_error;
+    DiscExit coarse;
+    const DiscExit fine = solve_disc_transport(*shared_->grid(size), visible, sigma_a, tolerance);
+    if (two_grids) coarse = solve_disc_transport(*shared_->grid(coarser(size)), visible, sigma_a, tolerance);
     std::vector<Profile> profiles;
     for (const double offset : h) {
         Profile profile;
-        profile.energy = disc_energy(sigma, offset);
-        profile.lobe = disc_single_lobe(sigma, shared_->g, offset, bins);
-        std::vector<double> difference(bins);
-        if (sigma > 0) {
-            std::vector<Complex> c = at_offset(fine, offset);
-            if (two_grids) {
-                std::vector<Complex> d = at_offset(coarse, offset);
-                d.resize(c.size());
-                for (std::size_t k = 0; k < c.size(); ++k) {
-                    d[k] = c[k] - d[k];
-                    c[k] += ahead * d[k];
-                }
-                add_modes(d, difference);
+        const double chord = 2 * std::sqrt((1 - offset) * (1 + offset));
+        const double collided = sigma > 0 ? disc_energy(extinction, offset) * (sigma / extinction) : 0;
+        profile.lobe = disc_single_lobe(extinction, shared_->g, offset, bins);
+        double single = 0;
+        for (const double x : profile.lobe) single += x * width;
+        const Light light = at_offset(fine, offset);
+        // The fraction of collided light that leaves, twice: as integral of the lobe, and as what is not absorbed on
+        // the way. Each is used where it keeps its digits.
+        const auto leaves = [&](const Light& l) {
+            const double lobe = single + 2 * pi * l.c[0].real(), path = 1 - sigma_a * l.rest;
+            return std::pair{lobe, path * path + (1 - path) * lobe};
+        };
+        const auto [integral, fraction] = leaves(light);
+        profile.energy = collided * fraction;
+        profile.energy_error = std::abs(integral - (1 - sigma_a * light.rest)) * collided;
+        if (sigma_a == 0) profile.mean_length = mean_first_flight(sigma, chord) + light.rest;
+        add_modes(light.c, profile.lobe);
+        if (two_grids) {
+            Light difference = at_offset(coarse, offset);
+            if (sigma_a > 0) profile.energy_error = share * std::abs(fraction - leaves(difference).second) * collided;
+            difference.c.resize(light.c.size());
+            for (std::size_t k = 0; k < light.c.size(); ++k) difference.c[k] -= light.c[k];
+            std::vector<double> lobe(bins);
+            add_modes(difference.c, lobe);
+            double square = 0, error = 0;
+            for (std::size_t b = 0; b < bins; ++b) {
+                square += profile.lobe[b] * profile.lobe[b];
+                error += lobe[b] * lobe[b];
             }
-            add_modes(c, profile.lobe);
+            profile.standard_error = share * std::sqrt(error / square) + (sigma > 0 ? fine.residual : 0);
         }
-        double sum = 0, square = 0, error = 0;
-        for (std::size_t b = 0; b < bins; ++b) {
-            sum += profile.lobe[b];
-            square += profile.lobe[b] * profile.lobe[b];
-            error += difference[b] * difference[b];
-        }
-        profile.energy_error = std::abs(sum * width - 1) * profile.energy;
-        profile.standard_error = two_grids ? std::sqrt(error / square) + fine.residual : 0;
-        for (double& x : profile.lobe) x /= sum * width;
+        double sum = 0;
+        for (const double x : profile.lobe) sum += x * width;
+        for (double& x : profile.lobe) x /= sum;
         profiles.push_back(std::move(profile));
     }
     return profiles;

@@ -18,9 +18,7 @@ using namespace medulla;
 
 namespace {
 
-double now() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 double distance(const std::vector<double>& a, const std::vector<double>& b) {
     double error = 0, norm = 0;
@@ -61,8 +59,8 @@ int main(int argc, char** argv) {
         if (x > 0.9 && x < 1) h.push_back(x);
     h.insert(h.end(), {0.95, 0.975, 0.985});
     nlohmann::json out;
-    std::printf("%7s %6s %8s %8s | %9s %9s | %9s %9s %9s | %9s\n", "sigma", "g", "target", "seconds", "error",
-                "worst", "estimated", "median", "least", "energy");
+    std::printf("%7s %6s %8s %8s | %9s %9s | %9s %9s %9s | %9s\n", "sigma", "g", "target", "seconds", "error", "worst",
+                "estimated", "median", "least", "energy");
     std::printf("%33s| %19s | %9s %19s |\n", "", "median", "worst", "estimated / true");
     for (const double sigma : sigmas)
         for (const double g : gs) {
@@ -83,8 +81,8 @@ int main(int argc, char** argv) {
                 }
                 const double worst = *std::max_element(error.begin(), error.end());
                 const double least = *std::min_element(ratio.begin(), ratio.end());
-                std::printf("%7g %6g %8.0e %8.3f | %9.1e %9.1e | %9.1e %9.1f %9.1f | %9.1e\n", sigma, g, target, seconds,
-                            median(error), worst, estimated, median(ratio), least, energy);
+                std::printf("%7g %6g %8.0e %8.3f | %9.1e %9.1e | %9.1e %9.1f %9.1f | %9.1e\n", sigma, g, target,
+                            seconds, median(error), worst, estimated, median(ratio), least, energy);
                 std::fflush(stdout);
                 out["slices"].push_back({{"sigma", sigma},
                                          {"g", g},
@@ -109,8 +107,8 @@ int main(int argc, char** argv) {
             for (std::size_t s = 0; s < estimate.size(); ++s) {
                 // The costly end first: great sigma.
                 const std::size_t slice = estimate.size() - 1 - s;
-                for (const auto& p : sim2d::DiscSolver(g[slice % g.size()], aiming_at(target))
-                                         .solve(sigma[slice / g.size()], h, 720))
+                for (const auto& p :
+                     sim2d::DiscSolver(g[slice % g.size()], aiming_at(target)).solve(sigma[slice / g.size()], h, 720))
                     estimate[slice] = std::max(estimate[slice], p.standard_error);
             }
             const double seconds = now() - start, worst = *std::max_element(estimate.begin(), estimate.end());

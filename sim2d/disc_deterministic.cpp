@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <map>
-#include <mutex>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 
 #include "sim2d/disc_grid.hpp"
@@ -97,9 +94,9 @@ void add_modes(const std::vector<Complex>& c, std::vector<double>& lobe) {
     }
 }
 
-/// Measured (docs/accuracy.md), for sigma <= 16 and |g| <= 0.95. Errors fall like the third power of all steps. Scattering
-/// makes the source under the rim behave like z log z over a depth z = rim^2 / 2; light that is scattered twice carries
-/// modes of g^(2 k).
+/// Measured (docs/accuracy.md), for sigma <= 16 and |g| <= 0.95. Errors fall like the third power of all steps.
+/// Scattering makes the source under the rim behave like z log z over a depth z = rim^2 / 2; light that is scattered
+/// twice carries modes of g^(2 k).
 DiscGridSize automatic(double sigma, double sigma_a, double g, const DiscOptions& options) {
     const double scale = std::cbrt(options.target_error / 1e-3), depth = std::min(sigma + sigma_a, 40.0);
     DiscGridSize size;
@@ -109,7 +106,10 @@ DiscGridSize automatic(double sigma, double sigma_a, double g, const DiscOptions
     size.growth = 1 + scale * (0.17 + 0.13 * std::exp(-depth / 4));
     const double visible = 0.6 * options.target_error / std::min(sigma, 1.0);
     const double tail = g == 0 || visible >= 1 ? 0 : std::log(visible) / (2 * std::log(std::abs(g)));
-    const double modes = std::max(19 + 4 * std::min(std::sqrt(sigma), 8.0), std::min(tail, 200.0));
+    // Near the tangent the lobe has a kink at phi = 0, softened by g only: algebraic in the modes.
+    const double kink =
+        (19 + 5 * std::min(std::sqrt(depth), 8.0)) * (1 + std::max(0.0, 3 * std::abs(g) - 1.5)) / std::max(scale, 0.5);
+    const double modes = std::min(std::max(kink, tail), 200.0);
     size.modes = options.modes > 0 ? options.modes : static_cast<int>(modes / 8) * 8 + 6;
     return size;
 }
@@ -135,34 +135,14 @@ double mean_first_flight(double extinction, double length) {
 
 }  // namespace
 
-struct DiscSolver::Shared {
-    double g;
-    DiscOptions options;
-    std::mutex mutex;
-    std::map<std::tuple<int, int, double, double>, std::shared_ptr<const DiscGrid>> grids;
-
-    std::shared_ptr<const DiscGrid> grid(const DiscGridSize& size) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        auto& entry = grids[{size.circles, size.modes, size.gap, size.rim}];
-        if (!entry) entry = std::make_shared<const DiscGrid>(g, size);
-        return entry;
-    }
-};
-
-DiscSolver::DiscSolver(double g, const DiscOptions& options) : shared_(std::make_unique<Shared>()) {
+DiscSolver::DiscSolver(double g, const DiscOptions& options) : g_(g), options_(options) {
     require(g > -1 && g < 1, "g: expected a value in (-1, 1)");
     require(options.circles == 0 || options.circles >= 6, "circles: expected at least 6, or 0");
     require(options.modes == 0 || options.modes >= 8, "modes: expected at least 8, or 0");
     require(options.target_error >= 1e-6 && options.target_error <= 0.1, "target_error: expected 1e-6 to 0.1");
     require(options.rim >= 0, "rim: expected an angle > 0, or 0");
     require(options.gap >= 0, "gap: expected an angle > 0, or 0");
-    shared_->g = g;
-    shared_->options = options;
 }
-
-DiscSolver::~DiscSolver() = default;
-DiscSolver::DiscSolver(DiscSolver&&) noexcept = default;
-DiscSolver& DiscSolver::operator=(DiscSolver&&) noexcept = default;
 
 std::vector<Profile> DiscSolver::solve(double sigma, const std::vector<double>& h, std::size_t bins) const {
     return solve(sigma, 0, h, bins);
@@ -175,21 +155,21 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
     require(bins > 0, "bins: expected at least one");
     for (const double offset : h) require(offset >= -1 && offset <= 1, "h: expected a value in [-1, 1]");
     const double extinction = sigma + sigma_a;
-    const DiscGridSize size = automatic(sigma, sigma_a, shared_->g, shared_->options);
+    const DiscGridSize size = automatic(sigma, sigma_a, g_, options_);
     const double width = 2 * pi / static_cast<double>(bins);
     // Everything is divided by the energy of the first collisions, so a limit sigma -> 0 is a solve at a sigma that
     // adds nothing to it in double precision.
-    const double visible = std::max(sigma, 1e-30), tolerance = 0.02 * std::min(shared_->options.target_error, 1e-3);
-    const bool two_grids = shared_->options.estimate_error;
+    const double visible = std::max(sigma, 1e-30), tolerance = 0.02 * std::min(options_.target_error, 1e-3);
+    const bool two_grids = options_.estimate_error;
     DiscExit coarse;
-    const DiscExit fine = solve_disc_transport(*shared_->grid(size), visible, sigma_a, tolerance);
-    if (two_grids) coarse = solve_disc_transport(*shared_->grid(coarser(size)), visible, sigma_a, tolerance);
+    const DiscExit fine = solve_disc_transport(DiscGrid(g_, size), visible, sigma_a, tolerance);
+    if (two_grids) coarse = solve_disc_transport(DiscGrid(g_, coarser(size)), visible, sigma_a, tolerance);
     std::vector<Profile> profiles;
     for (const double offset : h) {
         Profile profile;
         const double chord = 2 * std::sqrt((1 - offset) * (1 + offset));
         const double collided = sigma > 0 ? disc_energy(extinction, offset) * (sigma / extinction) : 0;
-        profile.lobe = disc_single_lobe(extinction, shared_->g, offset, bins);
+        profile.lobe = disc_single_lobe(extinction, g_, offset, bins);
         double single = 0;
         for (const double x : profile.lobe) single += x * width;
         const Light light = at_offset(fine, offset);

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <vector>
 
 #include "sim2d/profile.hpp"
@@ -21,15 +20,12 @@ struct DiscOptions {
     bool estimate_error = true;  ///< solve a second, coarser grid
 };
 
-/// All slices of one g; what depends on g alone is made once and shared. Threads may call `solve` at the same time;
+/// All slices of one g. Threads may call `solve` at the same time;
 /// one solve runs on one thread, and its result does not depend on the others.
 class DiscSolver {
   public:
     /// @param g mean cosine, in (-1, 1); the automatic grids are measured for sigma <= 16, [0, 0.95]
     explicit DiscSolver(double g, const DiscOptions& options = {});
-    ~DiscSolver();
-    DiscSolver(DiscSolver&&) noexcept;
-    DiscSolver& operator=(DiscSolver&&) noexcept;
 
     /// One Profile per h over `bins` bins of phi.
     /// @param sigma [1 / disc radius], >= 0   @param h offsets in [-1, 1]
@@ -45,8 +41,8 @@ class DiscSolver {
     std::vector<Profile> solve(double sigma, double sigma_a, const std::vector<double>& h, std::size_t bins) const;
 
   private:
-    struct Shared;
-    std::unique_ptr<Shared> shared_;
+    double g_;
+    DiscOptions options_;
 };
 
 }  // namespace medulla::sim2d

@@ -13,8 +13,8 @@ using PerMode = std::vector<double>;
 const std::size_t block_rows = 32;  ///< a block of a field stays in the first cache over all basis vectors
 
 /// products[i][k] = sum over rows of x y_i, i < count; within a block in DiscReal, over blocks in double.
-void dots(const DiscField& x, const std::vector<DiscField>& y, std::size_t count, std::size_t stride, std::size_t active,
-          PerMode* products) {
+void dots(const DiscField& x, const std::vector<DiscField>& y, std::size_t count, std::size_t stride,
+          std::size_t active, PerMode* products) {
     std::vector<DiscReal> sum(stride);
     for (std::size_t i = 0; i < count; ++i) products[i].assign(stride, 0.0);
     for (std::size_t at = 0; at < x.size(); at += block_rows * stride) {
@@ -39,7 +39,8 @@ PerMode square(const DiscField& x, std::size_t stride, std::size_t active) {
 }
 
 /// x -= sum over i < count of scale_i y_i, mode by mode.
-void subtract_all(DiscField& x, const std::vector<DiscField>& y, std::size_t count, std::size_t active, const PerMode* scale) {
+void subtract_all(DiscField& x, const std::vector<DiscField>& y, std::size_t count, std::size_t active,
+                  const PerMode* scale) {
     if (count == 0) return;
     const std::size_t stride = scale[0].size();
     std::vector<DiscReal> factor(count * stride);
@@ -47,8 +48,8 @@ void subtract_all(DiscField& x, const std::vector<DiscField>& y, std::size_t cou
         for (std::size_t k = 0; k < stride; ++k) factor[i * stride + k] = static_cast<DiscReal>(scale[i][k]);
     for (std::size_t at = 0; at < x.size(); at += block_rows * stride)
         for (std::size_t i = 0; i < count; ++i)
-            lanes::subtract(&x[at], &y[i][at], &factor[i * stride], std::min(block_rows, (x.size() - at) / stride), stride,
-                     active);
+            lanes::subtract(&x[at], &y[i][at], &factor[i * stride], std::min(block_rows, (x.size() - at) / stride),
+                            stride, active);
 }
 
 void multiply(DiscField& a, const PerMode& scale, std::size_t active) {

@@ -28,8 +28,8 @@ Tap tap(const double* psi, std::ptrdiff_t count, std::ptrdiff_t t, double about_
     return {2 * count - 2 - t, about_grazing, pi - psi[2 * count - 2 - t]};
 }
 
-/// Fourier coefficients in psi of the piecewise polynomial through the nodes: row = harmonic n of cosine or sine, exact up
-/// to the Gauss rule per panel; c_n = (4 / pi) integral over (0, pi / 2), half that for n = 0.
+/// Fourier coefficients in psi of the piecewise polynomial through the nodes: row = harmonic n of cosine or sine, exact
+/// up to the Gauss rule per panel; c_n = (4 / pi) integral over (0, pi / 2), half that for n = 0.
 Matrix analyse(const double* psi, std::ptrdiff_t count, int part, std::size_t harmonics, bool rim) {
     const bool cosine = DiscGrid::is_cosine(part);
     const int lowest = DiscGrid::parity(part), highest = lowest + 2 * static_cast<int>(harmonics) - 2;
@@ -41,7 +41,7 @@ Matrix analyse(const double* psi, std::ptrdiff_t count, int part, std::size_t ha
         const double low = panel < 0 ? 0 : psi[panel], high = psi[panel + 1];
         // Points for a polynomial times a wave of n_max (high - low) radians.
         const int points = 4 + static_cast<int>(std::ceil(0.5 * highest * (high - low)));
-        const GaussRule rule = gauss_legendre(points);
+        const GaussRule rule = unit_gauss_rule(points);
         // On the rim nothing comes in: a part ends at pi / 2 with a kink, where the stencil stops.
         const std::ptrdiff_t middle = panel + 1 - taps / 2;
         const std::ptrdiff_t start = std::max(-count, rim ? std::min(middle, count - taps) : middle);
@@ -105,7 +105,8 @@ DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : size(wanted) {
         const double inner = i == 0 ? 0 : radius[i - 1];
         const double arc = std::acos(inner / radius[i]);
         const int count = std::max(2, static_cast<int>(std::ceil(arc / size.gap)));
-        const double intervals = i == 0 ? count - 0.5 : count;  // half a gap from the centre, one from the circle inside
+        const double intervals =
+            i == 0 ? count - 0.5 : count;  // half a gap from the centre, one from the circle inside
         for (int m = count - 1; m >= 0; --m) {
             offset.push_back(radius[i] * std::cos(arc * m / intervals));
             ring.push_back(i);
@@ -116,7 +117,8 @@ DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : size(wanted) {
     first.push_back(psi.size());
     stride = (static_cast<std::size_t>(size.modes) + 9) / 8 * 8;
     const int highest = static_cast<int>(stride) - 2;
-    reach = highest + (g == 0 ? 0 : static_cast<int>(std::ceil(std::min(400.0, std::log(1e-7) / std::log(std::abs(g))))));
+    reach =
+        highest + (g == 0 ? 0 : static_cast<int>(std::ceil(std::min(400.0, std::log(1e-7) / std::log(std::abs(g))))));
     for (std::size_t i = 0; i < circles(); ++i)
         for (int part = 0; part < disc_parts; ++part) {
             const auto count = static_cast<std::ptrdiff_t>(chords(i));

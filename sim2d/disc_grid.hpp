@@ -35,13 +35,13 @@ class DiscGrid {
     DiscGrid(double g, const DiscGridSize& size);
 
     DiscGridSize size;
-    std::vector<double> radius;          ///< of circle i, increasing, the last is 1
-    std::vector<double> offset;          ///< b of chord m, increasing; chords [0, chords(i)) meet circle i
-    std::vector<std::size_t> ring;       ///< first circle that chord m meets
-    std::vector<std::size_t> first;      ///< first[i] + m: node of circle i on chord m; first[circles] = node count
-    std::vector<double> psi;             ///< per node, in (0, pi / 2]
-    std::size_t stride;                  ///< columns: path length, then modes 0, 1, ..; a multiple of 8
-    int reach;                           ///< highest m: |g|^|m - k| < 1e-7 beyond, for every k
+    std::vector<double> radius;      ///< of circle i, increasing, the last is 1
+    std::vector<double> offset;      ///< b of chord m, increasing; chords [0, chords(i)) meet circle i
+    std::vector<std::size_t> ring;   ///< first circle that chord m meets
+    std::vector<std::size_t> first;  ///< first[i] + m: node of circle i on chord m; first[circles] = node count
+    std::vector<double> psi;         ///< per node, in (0, pi / 2]
+    std::size_t stride;              ///< columns: path length, then modes 0, 1, ..; a multiple of 8
+    int reach;                       ///< highest m: |g|^|m - k| < 1e-7 beyond, for every k
 
     /// Column 0 is the path length of uniform light (k = 0), the others are modes of the plane wave.
     static std::size_t mode_of(std::size_t column) { return column == 0 ? 0 : column - 1; }

@@ -53,7 +53,8 @@ std::vector<DiscTransport::Cell> DiscTransport::chord_cells(const std::vector<do
             for (std::size_t c = 0; c < taps; ++c) {
                 if (c == a) continue;
                 const double there = (s[cell.start + c] - s[p]) / length, scale = 1 / (here - there);
-                for (int j = disc_taps - 1; j > 0; --j) polynomial[j] = scale * (polynomial[j - 1] - there * polynomial[j]);
+                for (int j = disc_taps - 1; j > 0; --j)
+                    polynomial[j] = scale * (polynomial[j - 1] - there * polynomial[j]);
                 polynomial[0] *= -scale * there;
             }
             for (int j = 0; j < disc_taps; ++j) weight += length * polynomial[j] * moment[j];
@@ -120,7 +121,8 @@ void DiscTransport::first_collision(DiscField& source) {
         }
     Matrix cosines(top, samples / 2 + 1);
     for (Eigen::Index k = 0; k < top; ++k)
-        for (Eigen::Index a = 0; a <= samples / 2; ++a) cosines(k, a) = table[static_cast<std::size_t>((k * a) % samples)];
+        for (Eigen::Index a = 0; a <= samples / 2; ++a)
+            cosines(k, a) = table[static_cast<std::size_t>((k * a) % samples)];
     const Matrix f = cosines * attenuation;
     for (std::size_t i = 0; i < grid_.circles(); ++i)
         for (int part = 0; part < disc_parts; ++part) {
@@ -169,8 +171,8 @@ void DiscTransport::chord(std::size_t m, const DiscField& source, DiscField& rad
     for (std::size_t c = 0; c < met; ++c)
         for (int part = 0; part < 2; ++part)
             lanes::sum_difference(&source[row(ring + c, sums[part], m) * stride],
-                                  &source[row(ring + c, differences[part], m) * stride], DiscReal(1),
-                                  at(out + c, part), at(met - 1 - c, part), active);
+                                  &source[row(ring + c, differences[part], m) * stride], DiscReal(1), at(out + c, part),
+                                  at(met - 1 - c, part), active);
     // March from the rim, where nothing comes in. The radiance on the way in waits in the sum rows for the way out.
     std::fill(flux_.begin(), flux_.end(), DiscReal(0));
     for (std::size_t p = 0; p < out + met; ++p) {
@@ -181,8 +183,7 @@ void DiscTransport::chord(std::size_t m, const DiscField& source, DiscField& rad
                 lanes::advance(flux, cell.transmission, cell.weight, at(cell.start, part), 2 * stride, cell.taps,
                                active);
             }
-            if (p < met)
-                std::copy_n(flux, active, &radiance[row(grid_.circles() - 1 - p, sums[part], m) * stride]);
+            if (p < met) std::copy_n(flux, active, &radiance[row(grid_.circles() - 1 - p, sums[part], m) * stride]);
             if (p >= out) {
                 DiscReal* sum = &radiance[row(ring + p - out, sums[part], m) * stride];
                 lanes::sum_difference(flux, sum, DiscReal(0.5), sum,

@@ -30,30 +30,6 @@ std::size_t points_for(double ratio) {
 
 }  // namespace
 
-GaussLegendre gauss_legendre(std::size_t n) {
-    GaussLegendre rule{std::vector<double>(n), std::vector<double>(n)};
-    for (std::size_t i = 0; i < (n + 1) / 2; ++i) {
-        double x = std::cos(kPi * (double(i) + 0.75) / (double(n) + 0.5)), slope = 1;
-        for (int iteration = 0; iteration < 100; ++iteration) {
-            double p = 1, previous = 0;
-            for (std::size_t k = 1; k <= n; ++k) {
-                const double next = ((2 * double(k) - 1) * x * p - (double(k) - 1) * previous) / double(k);
-                previous = p;
-                p = next;
-            }
-            slope = double(n) * (previous - x * p) / ((1 - x) * (1 + x));
-            const double step = p / slope;
-            x -= step;
-            if (std::abs(step) < 1e-15) break;
-        }
-        if (n % 2 == 1 && i == n / 2) x = 0;
-        rule.node[i] = -x;
-        rule.node[n - 1 - i] = x;
-        rule.weight[i] = rule.weight[n - 1 - i] = 2 / ((1 - x) * (1 + x) * slope * slope);
-    }
-    return rule;
-}
-
 SlabDirections slab_directions(std::size_t count) {
     const GaussLegendre rule = gauss_legendre(2 * count);
     SlabDirections d;

@@ -16,11 +16,11 @@ struct CompressWords {
     double max_error = 0;
     std::size_t max_bytes = 0;
     std::uint64_t seed = 1;
-    bool json = false;
+    bool nonnegative = false, json = false;
 };
 
 const char* name_of(Mirror mirror) {
-    return mirror == Mirror::none ? "energies" : (mirror == Mirror::even ? "even" : "odd");
+    return mirror == Mirror::none ? "whole" : (mirror == Mirror::even ? "even" : "odd");
 }
 
 nlohmann::ordered_json to_json(const TableReport& report) {
@@ -64,6 +64,7 @@ void run_compress(const CompressWords& words) {
     options.rank = words.rank;
     options.seed = words.seed;
     options.solver = words.solver == "als" ? tensor::Solver::als : tensor::Solver::lm;
+    if (words.nonnegative) options.solver = tensor::Solver::nonnegative;
     if (words.max_error > 0) options.max_error = words.max_error;
     if (words.max_bytes > 0) options.max_bytes = words.max_bytes;
     std::string input;
@@ -155,6 +156,10 @@ void add_compress(CLI::App& app, Action& action) {
             command.add_option("--solver", words.solver, "alternating least squares or Levenberg-Marquardt")
                 ->check(CLI::IsMember({"als", "lm"}))
                 ->capture_default_str();
+            command
+                .add_flag("--nonnegative", words.nonnegative,
+                          "factors >= 0: each component is a density; by coordinate descent")
+                ->excludes("--solver");
             command.add_option("--seed", words.seed, "of the solver's start")->capture_default_str();
             command.add_flag("--json", words.json, "print one JSON object");
         },

@@ -12,6 +12,7 @@ namespace medulla::tables {
 using Action = std::function<void()>;
 
 void add_info(CLI::App& app, Action& action);
+void add_merge(CLI::App& app, Action& action);
 void add_compress(CLI::App& app, Action& action);
 void add_query(CLI::App& app, Action& action);
 void add_verify(CLI::App& app, Action& action);

@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
     add_query(app, action);
     add_verify(app, action);
     add_diff(app, action);
+    add_merge(app, action);
     add_plot(app, action);
     add_export(app, action);
     add_bcsdf(app, action);

@@ -46,7 +46,7 @@ void check(herr_t status, const std::string& what) {
 /// A file in memory as HDF5 leaves it when it closes it. (H5Fget_file_image gives one that is marked as being written.)
 struct Image {
     unsigned char* bytes = nullptr;
-    hsize_t size = 0;
+    std::size_t size = 0;
 
     Image() = default;
     ~Image() { std::free(bytes); }
@@ -318,9 +318,10 @@ void write_tables(const std::string& path, const Tables& tables, Compression com
         write_attribute(file, "sha256", hex(contents_hash(tables)), path);
         for (const Table* table : tables.present()) write_table(file, *table, compression, path);
         check(H5Fflush(file, H5F_SCOPE_LOCAL), path + ": cannot be written");
-        check(H5Fget_filesize(file, &image.size), path + ": HDF5 gives no file");
+        const ssize_t size = H5Fget_file_image(file, nullptr, 0);
+        image.size = size > 0 ? static_cast<std::size_t>(size) : 0;
     }
-    if (!image.bytes) throw Error("{}: HDF5 gives no file", path);
+    if (!image.bytes || image.size == 0) throw Error("{}: HDF5 gives no file", path);
     pending.write(image.bytes, image.size);
     pending.commit();
 }

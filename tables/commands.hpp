@@ -22,6 +22,9 @@ void add_export(CLI::App& app, Action& action);
 void add_bcsdf(CLI::App& app, Action& action);
 void add_presets(CLI::App& app, Action& action);
 
+/// All of them.
+void add_commands(CLI::App& app, Action& action);
+
 /// The rows of a LobeError that compress, diff and verify print alike.
 nlohmann::ordered_json to_json(const std::vector<LobeError>& errors);
 void print(const std::vector<LobeError>& errors);

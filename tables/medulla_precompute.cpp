@@ -124,11 +124,7 @@ void run(const Words& words) {
         fmt::print("{} written in {}\n", words.output, duration_text(seconds));
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-    CLI::App app("Simulates the scattering of a fur fibre's medulla into tables (HDF5).", "medulla-precompute");
-    Words words;
+void declare(CLI::App& app, Words& words) {
     app.set_version_flag("--version", "medulla " MEDULLA_VERSION);
     app.add_option("-o,--output", words.output, "tables file to write")->capture_default_str();
     app.add_option("--table", words.table, "which table")
@@ -157,5 +153,13 @@ int main(int argc, char** argv) {
         ->check(CLI::IsMember({"auto", "bar", "plain", "none"}))
         ->capture_default_str();
     app.add_flag("--json", words.json, "print one JSON object on standard output");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Simulates the scattering of a fur fibre's medulla into tables (HDF5).", "medulla-precompute");
+    Words words;
+    declare(app, words);
     return run_program(app, argc, argv, [&] { run(words); });
 }

@@ -31,8 +31,8 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
             declare(app, declared);
             app.parse(words);
             const Job job = job_of(declared);
-            (void)plan_of(job.request);
-            (void)parse_shard(declared.shard);
+            if (job.shard && (job.shard->index < 1 || job.shard->index > job.shard->count)) std::abort();
+            check_request(job.request);
         } else {
             Action action;
             add_commands(app, action);

@@ -58,7 +58,8 @@ nlohmann::ordered_json info(const std::string& path) {
         if (!table) continue;
         const auto kind = static_cast<TableKind>(table.layout.kind);
         nlohmann::ordered_json& out = json["tables"][name_of(kind)];
-        out["rank"] = table.layout.rank;
+        out["rank"] = table.layout.even_rank + table.layout.odd_rank;
+        out["even_rank"] = table.layout.even_rank;
         for (const Axis& axis : source->parameter_axes(kind)) out["axes"].push_back(axis_json(axis));
         if (table.has_exit())
             out["exit"] = {{"name", exit_name(kind)},

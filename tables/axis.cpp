@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "sim2d/elementary.hpp"
 #include "tables/error.hpp"
 
 namespace medulla::tables {
@@ -131,8 +132,8 @@ Axis graded_axis(const std::string& name, const Range& range) {
         const double u = static_cast<double>(i) / static_cast<double>(range.count - 1);
         double t = u;
         if (name == "sigma" || name == "absorption") t = u * u;
-        if (name == "g") t = 1 - std::pow(1 - u, 1.5);
-        if (name == "h") t = std::sin(pi * u / 2);
+        if (name == "g") t = 1 - (1 - u) * std::sqrt(1 - u);
+        if (name == "h") t = sim2d::portable::sin(pi * u / 2);
         axis.values[i] = range.low + (range.high - range.low) * t;
     }
     axis.values.back() = range.high;

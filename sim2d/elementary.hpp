@@ -126,16 +126,20 @@ inline double expm1(double x) noexcept {
     return (u - 1) * (x / log(u));
 }
 
-/// Sine and cosine of |x| <= pi / 2.
+/// Sine and cosine of |x| <= pi.
 inline double sin(double x) noexcept {
     const double a = std::abs(x);
     if (a <= 0.78539816339744830962) return detail::sin_near_0(x, 0);
-    return std::copysign(detail::cos_near_0(detail::half_pi_high - a, detail::half_pi_low), x);
+    const double value = a <= 2.35619449019234492885
+                             ? detail::cos_near_0(detail::half_pi_high - a, detail::half_pi_low)
+                             : detail::sin_near_0(2 * detail::half_pi_high - a, 2 * detail::half_pi_low);
+    return std::copysign(1.0, x) * value;
 }
 inline double cos(double x) noexcept {
     const double a = std::abs(x);
     if (a <= 0.78539816339744830962) return detail::cos_near_0(x, 0);
-    return detail::sin_near_0(detail::half_pi_high - a, detail::half_pi_low);
+    if (a <= 2.35619449019234492885) return detail::sin_near_0(detail::half_pi_high - a, detail::half_pi_low);
+    return -detail::cos_near_0(2 * detail::half_pi_high - a, 2 * detail::half_pi_low);
 }
 
 /// Angle of (x, y) in [-pi, pi], finite arguments; 0 for (0, 0) with the sign of y.
@@ -145,6 +149,12 @@ inline double atan2(double y, double x) noexcept {
     double angle = a == 0 ? 0 : detail::atan_of_positive(b / a);
     if (std::signbit(x)) angle = 2 * detail::half_pi_high - (angle - 2 * detail::half_pi_low);
     return std::copysign(angle, y);
+}
+
+/// The runtime's planar_hg_pdf (medulla/phase.hpp), |t| <= 2 pi.
+inline double planar_hg_pdf(double t, double g) noexcept {
+    const double half = g < 0 ? cos(t / 2) : sin(t / 2), a = std::abs(g);
+    return (1 - a) * (1 + a) / (2 * 3.14159265358979323846 * ((1 - a) * (1 - a) + 4 * a * half * half));
 }
 
 }  // namespace medulla::sim2d::portable

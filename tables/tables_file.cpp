@@ -227,6 +227,28 @@ std::string shape_text(const std::vector<hsize_t>& shape) {
     return text;
 }
 
+/// Throws Error unless a dataset is stored as write_array stores it: chunks within the array, numbers of at most 8
+/// bytes, our filters alone. HDF5 allocates what these say before it reads.
+void check_storage(hid_t set, hid_t type, const std::vector<hsize_t>& shape, const std::string& where) {
+    const Handle properties(H5Dget_create_plist(set), H5Pclose, where + ": cannot be read");
+    std::vector<hsize_t> chunk(shape.size());
+    if (H5Tget_size(type) > 8 || H5Pget_layout(properties) != H5D_CHUNKED ||
+        H5Pget_chunk(properties, static_cast<int>(chunk.size()), chunk.data()) != static_cast<int>(chunk.size()))
+        throw Error("{}: expected an array in chunks", where);
+    for (std::size_t k = 0; k < chunk.size(); ++k)
+        if (chunk[k] < 1 || chunk[k] > shape[k])
+            throw Error("{}: expected chunks within shape {}, found {}", where, shape_text(shape), shape_text(chunk));
+    const int filters = H5Pget_nfilters(properties);
+    for (int i = 0; i < filters; ++i) {
+        unsigned flags = 0, config = 0;
+        std::size_t count = 0;
+        const H5Z_filter_t id =
+            H5Pget_filter2(properties, static_cast<unsigned>(i), &flags, &count, nullptr, 0, nullptr, &config);
+        if (id != H5Z_FILTER_SHUFFLE && id != H5Z_FILTER_DEFLATE && id != H5Z_FILTER_FLETCHER32 && id != zstd_filter_id)
+            throw Error("{}: expected shuffle, gzip, zstd and Fletcher-32 filters, found filter {}", where, id);
+    }
+}
+
 template <class T>
 std::vector<T> read_array(hid_t group, const std::string& name, hid_t memory, const std::vector<hsize_t>& expected,
                           const std::string& where, bool may_be_infinite = false) {
@@ -244,6 +266,7 @@ std::vector<T> read_array(hid_t group, const std::string& name, hid_t memory, co
         throw Error("{}/{}: expected shape {}, found {}", where, name, shape_text(expected), shape_text(shape));
     if (expected.empty() && (rank != 1 || shape[0] < 1 || shape[0] > 4096))
         throw Error("{}/{}: expected 1 to 4096 values, found shape {}", where, name, shape_text(shape));
+    check_storage(set, type, shape, fmt::format("{}/{}", where, name));
     std::size_t count = 1;
     for (const hsize_t n : shape) count *= n;
     // What a file declares it must also hold: a damaged one cannot make us allocate beyond 1000 times its size.

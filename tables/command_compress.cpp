@@ -19,7 +19,7 @@ struct CompressWords {
     bool nonnegative = false, json = false;
 };
 
-const char* name_of(Mirror mirror) {
+const char* mirror_name(Mirror mirror) {
     return mirror == Mirror::none ? "whole" : (mirror == Mirror::even ? "even" : "odd");
 }
 
@@ -28,13 +28,13 @@ nlohmann::ordered_json to_json(const TableReport& report) {
                                    {"relative_l2_of_exit_spline", report.exit_error},
                                    {"relative_l2_of_input_noise", report.noise}};
     for (const PartReport& part : report.parts)
-        json["parts"][name_of(part.mirror)] = {{"rank", part.rank},
-                                               {"solver", part.solve.solver},
-                                               {"iterations", part.solve.iterations},
-                                               {"stop", tensor::to_string(part.solve.stop)},
-                                               {"seconds", part.solve.seconds},
-                                               {"least_cosine", part.solve.degeneracy.least_cosine},
-                                               {"norm_ratio", part.solve.degeneracy.norm_ratio}};
+        json["parts"][mirror_name(part.mirror)] = {{"rank", part.rank},
+                                                   {"solver", part.solve.solver},
+                                                   {"iterations", part.solve.iterations},
+                                                   {"stop", tensor::to_string(part.solve.stop)},
+                                                   {"seconds", part.solve.seconds},
+                                                   {"least_cosine", part.solve.degeneracy.least_cosine},
+                                                   {"norm_ratio", part.solve.degeneracy.norm_ratio}};
     return json;
 }
 
@@ -85,7 +85,7 @@ void run_compress(const CompressWords& words) {
                    medulla::tables::name_of(report.kind), report.fit_error, report.exit_error, report.noise);
         for (const PartReport& part : report.parts)
             fmt::print("  {:<8} rank {:>3}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
-                       name_of(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
+                       mirror_name(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
                        tensor::to_string(part.solve.stop), part.solve.seconds, part.solve.degeneracy.least_cosine,
                        part.solve.degeneracy.norm_ratio);
     }

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "sim2d/elementary.hpp"
+
 namespace medulla::sim2d {
 
 /// Nodes in (-1, 1), ascending, and weights of the n-point Gauss-Legendre rule.
@@ -17,7 +19,7 @@ inline GaussLegendre gauss_legendre(std::size_t n) {
     const double pi = 3.14159265358979323846;
     GaussLegendre rule{std::vector<double>(n), std::vector<double>(n)};
     for (std::size_t i = 0; i < (n + 1) / 2; ++i) {
-        double x = std::cos(pi * (double(i) + 0.75) / (double(n) + 0.5)), slope = 1;
+        double x = portable::cos(pi * (double(i) + 0.75) / (double(n) + 0.5)), slope = 1;
         for (int iteration = 0; iteration < 100; ++iteration) {
             double p = 1, previous = 0;
             for (std::size_t k = 1; k <= n; ++k) {

@@ -16,11 +16,11 @@ struct CompressWords {
     double max_error = 0;
     std::size_t max_bytes = 0;
     std::uint64_t seed = 1;
-    bool json = false;
+    bool nonnegative = false, json = false;
 };
 
-const char* name_of(Mirror mirror) {
-    return mirror == Mirror::none ? "energies" : (mirror == Mirror::even ? "even" : "odd");
+const char* mirror_name(Mirror mirror) {
+    return mirror == Mirror::none ? "whole" : (mirror == Mirror::even ? "even" : "odd");
 }
 
 nlohmann::ordered_json to_json(const TableReport& report) {
@@ -28,13 +28,13 @@ nlohmann::ordered_json to_json(const TableReport& report) {
                                    {"relative_l2_of_exit_spline", report.exit_error},
                                    {"relative_l2_of_input_noise", report.noise}};
     for (const PartReport& part : report.parts)
-        json["parts"][name_of(part.mirror)] = {{"rank", part.rank},
-                                               {"solver", part.solve.solver},
-                                               {"iterations", part.solve.iterations},
-                                               {"stop", tensor::to_string(part.solve.stop)},
-                                               {"seconds", part.solve.seconds},
-                                               {"least_cosine", part.solve.degeneracy.least_cosine},
-                                               {"norm_ratio", part.solve.degeneracy.norm_ratio}};
+        json["parts"][mirror_name(part.mirror)] = {{"rank", part.rank},
+                                                   {"solver", part.solve.solver},
+                                                   {"iterations", part.solve.iterations},
+                                                   {"stop", tensor::to_string(part.solve.stop)},
+                                                   {"seconds", part.solve.seconds},
+                                                   {"least_cosine", part.solve.degeneracy.least_cosine},
+                                                   {"norm_ratio", part.solve.degeneracy.norm_ratio}};
     return json;
 }
 
@@ -64,6 +64,7 @@ void run_compress(const CompressWords& words) {
     options.rank = words.rank;
     options.seed = words.seed;
     options.solver = words.solver == "als" ? tensor::Solver::als : tensor::Solver::lm;
+    if (words.nonnegative) options.solver = tensor::Solver::nonnegative;
     if (words.max_error > 0) options.max_error = words.max_error;
     if (words.max_bytes > 0) options.max_bytes = words.max_bytes;
     std::string input;
@@ -84,7 +85,7 @@ void run_compress(const CompressWords& words) {
                    medulla::tables::name_of(report.kind), report.fit_error, report.exit_error, report.noise);
         for (const PartReport& part : report.parts)
             fmt::print("  {:<8} rank {:>3}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
-                       name_of(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
+                       mirror_name(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
                        tensor::to_string(part.solve.stop), part.solve.seconds, part.solve.degeneracy.least_cosine,
                        part.solve.degeneracy.norm_ratio);
     }
@@ -155,6 +156,10 @@ void add_compress(CLI::App& app, Action& action) {
             command.add_option("--solver", words.solver, "alternating least squares or Levenberg-Marquardt")
                 ->check(CLI::IsMember({"als", "lm"}))
                 ->capture_default_str();
+            command
+                .add_flag("--nonnegative", words.nonnegative,
+                          "factors >= 0: each component is a density; by coordinate descent")
+                ->excludes("--solver");
             command.add_option("--seed", words.seed, "of the solver's start")->capture_default_str();
             command.add_flag("--json", words.json, "print one JSON object");
         },

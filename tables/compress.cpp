@@ -42,7 +42,6 @@ struct Solve {
     tensor::CpResult result = {};
     double error = 0;  ///< relative L2 of the kind, without the exit spline's share
 
-    bool lobes() const { return part->mirror != Mirror::none; }
     /// Error expected at another rank.
     double expected(double other) const { return error * std::pow(other / rank, -decay); }
 };
@@ -59,7 +58,9 @@ void run(Solves& solves, const CompressOptions& options, bool pilot) {
         settings.rank = solve.rank;
         settings.seed = options.seed;
         if (pilot) settings.restarts = 1;
-        solve.result = tensor::cp(solve.part->values, options.solver, settings);
+        // The slab's energies are no densities: nothing asks their factors to be non-negative.
+        const bool signed_factors = !solve.part->lobes() && options.solver == tensor::Solver::nonnegative;
+        solve.result = tensor::cp(solve.part->values, signed_factors ? tensor::Solver::lm : options.solver, settings);
         solve.error = solve.part->share * solve.result.report.relative_error;
     }
 }
@@ -70,7 +71,7 @@ int padded(int rank) { return static_cast<int>(padded_rank(static_cast<std::uint
 int stored_rank(const Solves& solves, TableKind kind) {
     int sum = 0;
     for (const Solve& solve : solves)
-        if (solve.part->kind == kind) sum += padded(solve.rank);
+        if (solve.part->kind == kind) sum += padded(solve.rank) * solve.part->copies();
     return sum;
 }
 
@@ -115,8 +116,8 @@ std::size_t pack_bytes(Solves solves) {
     for (Solve& solve : solves) {
         solve.result.model.weights = Eigen::VectorXd::Zero(solve.rank);
         solve.result.model.factors.clear();
-        for (const Eigen::MatrixXd& map : solve.part->maps)
-            solve.result.model.factors.push_back(Eigen::MatrixXd::Zero(map.cols(), solve.rank));
+        for (const std::size_t n : solve.part->values.shape)
+            solve.result.model.factors.push_back(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), solve.rank));
     }
     std::vector<PackedTable> tables;
     for (const auto& [first, last] : kinds_of(solves)) tables.push_back(pack_kind(solves, first, last, {0, 0}));
@@ -127,7 +128,7 @@ void share_bytes(Solves& solves, std::size_t bytes) {
     const Solves pilot = solves;
     const auto set = [&](double lambda) {
         for (std::size_t i = 0; i < solves.size(); ++i) {
-            if (!solves[i].lobes()) continue;
+            if (!solves[i].part->lobes()) continue;
             const double share = share_of(pilot[i], lambda) / rank_step;
             solves[i].rank = rank_step * std::clamp(static_cast<int>(share), 1, greatest_rank / 2 / rank_step);
         }
@@ -144,7 +145,8 @@ void share_bytes(Solves& solves, std::size_t bytes) {
         std::size_t best = solves.size();
         double most = 0;
         for (std::size_t i = 0; i < solves.size(); ++i) {
-            if (!solves[i].lobes() || stored_rank(solves, solves[i].part->kind) + rank_step > greatest_rank) continue;
+            if (!solves[i].part->lobes() || stored_rank(solves, solves[i].part->kind) + rank_step > greatest_rank)
+                continue;
             const double now = pilot[i].expected(solves[i].rank), then = pilot[i].expected(solves[i].rank + rank_step);
             const double gain = (now * now - then * then) / static_cast<double>(solves[i].part->component_bytes());
             if (gain <= most) continue;
@@ -168,7 +170,7 @@ double kind_error(const Solves& solves, std::size_t first, std::size_t last) {
 /// until the prediction stands.
 void solve_to(Solves& solves, double error, const CompressOptions& options) {
     for (const auto& [first, last] : kinds_of(solves)) {
-        if (!solves[first].lobes()) {
+        if (!solves[first].part->lobes()) {
             solves[first].rank = energy_rank;
             continue;
         }
@@ -242,7 +244,7 @@ std::string provenance(const Tables& tables, const CompressOptions& options, con
 
 std::pair<float, float> range_of(const Part& part, const Tables& tables) {
     std::vector<double> values = part.values.values;
-    if (part.mirror != Mirror::none)
+    if (part.lobes())
         values = side_lobes(part.kind == TableKind::azimuthal ? *tables.azimuthal : *tables.longitudinal,
                             part.kind == TableKind::longitudinal_forward ? 1 : 0);
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
@@ -259,7 +261,7 @@ TableReport report_of(const Solves& solves, std::size_t first, std::size_t last,
         spline += solves[i].part->exit_error * solves[i].part->exit_error;
     }
     report.exit_error = std::sqrt(spline);
-    if (solves[first].lobes())
+    if (solves[first].part->lobes())
         report.noise =
             table_noise(report.kind == TableKind::azimuthal ? *tables.azimuthal : *tables.longitudinal, report.kind);
     return report;
@@ -273,11 +275,12 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 CompressResult compress(const Tables& tables, const CompressOptions& options, const std::string& input) {
     const auto start = std::chrono::steady_clock::now();
-    const std::vector<Part> parts = parts_of(tables, options.phi_spans, options.theta_spans);
+    const std::vector<Part> parts = (options.solver == tensor::Solver::nonnegative ? whole_lobes_of : parts_of)(
+        tables, options.phi_spans, options.theta_spans);
     Solves solves;
     const bool searched = options.max_error || options.max_bytes;
     const int rank = searched ? pilot_rank : options.rank;
-    for (const Part& part : parts) solves.push_back({&part, part.mirror == Mirror::none ? energy_rank : rank});
+    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank});
     if (searched) run(solves, options, true);
     if (options.max_error) solve_to(solves, *options.max_error, options);
     if (options.max_bytes) share_bytes(solves, *options.max_bytes);

@@ -23,7 +23,7 @@ struct CompressOptions {
 };
 
 struct PartReport {
-    Mirror mirror;  ///< none: the slab's energies, which have no exit direction
+    Mirror mirror;  ///< none: the slab's energies, which have no exit direction, and whole non-negative lobes
     tensor::CpReport solve;
     int rank = 0;
 };

@@ -5,6 +5,7 @@
 
 #include "medulla/phase.hpp"
 #include "tables/source.hpp"
+#include "tensor/hosvd.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -73,8 +74,49 @@ Part lobe_part(const Table& table, TableKind kind, Mirror mirror, const std::vec
     part.share = std::sqrt(2.0) * reduced.norm() / whole;
     part.exit_error = std::sqrt(2 * outside) / whole;
     part.axes.push_back({quantity_of(exit_name(kind)), static_cast<std::uint32_t>(bins), exit, {}});
-    part.maps.push_back(free *
-                        qr.matrixQR().topRows(k).triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(k, k)));
+    part.exit_maps = {free *
+                      qr.matrixQR().topRows(k).triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(k, k))};
+    return part;
+}
+
+Part whole_part(const Table& table, TableKind kind, const std::vector<double>& lobes, double whole, std::size_t spans) {
+    Part part;
+    part.kind = kind, part.mirror = Mirror::none;
+    add_parameters(table, part);
+    const std::size_t bins = table.bins();
+    const std::vector<double> right = exit_breakpoints(kind, bins, spans);
+    std::vector<double> breakpoints, edges;
+    for (std::size_t i = right.size(); i-- > 1;) breakpoints.push_back(-right[i]);
+    breakpoints.insert(breakpoints.end(), right.begin(), right.end());
+    for (std::size_t b = 0; b <= bins; ++b)
+        edges.push_back(right.back() * (2 * static_cast<double>(b) / static_cast<double>(bins) - 1));
+    const Spline half(right), full(breakpoints);
+    // Free coefficients: an azimuth's last three are its first three again (breakpoints are symmetric, so the mirrored
+    // ghosts are the periodic ones).
+    const Eigen::Index turn = kind == TableKind::azimuthal ? full.spans() : full.size();
+    Eigen::MatrixXd free = Eigen::MatrixXd::Zero(full.size(), turn);
+    for (Eigen::Index i = 0; i < full.size(); ++i) free(i, i % turn) = 1;
+    const Eigen::VectorXd weight = (free.transpose() * full.integrals()).cwiseSqrt();
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(full.averages(edges) * free);
+    const auto cells = static_cast<Eigen::Index>(lobes.size() / bins);
+    const RowMajor q = qr.householderQ() * Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(bins), turn);
+    const RowMajor inside = Eigen::Map<const RowMajor>(lobes.data(), cells, static_cast<Eigen::Index>(bins)) * q;
+    part.exit_error = std::sqrt(std::max(0.0, whole * whole - inside.squaredNorm())) / whole;
+    const Eigen::MatrixXd solve =
+        qr.matrixQR().topRows(turn).triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(turn, turn));
+    part.values.shape.push_back(static_cast<std::size_t>(turn));
+    part.values.values.resize(static_cast<std::size_t>(cells * turn));
+    Eigen::Map<RowMajor>(part.values.values.data(), cells, turn).noalias() =
+        inside * (weight.asDiagonal() * solve).transpose();
+    for (std::size_t k = 0; k < part.maps.size(); ++k) {
+        part.values = tensor::multiply(part.values, part.maps[k], k);
+        part.maps[k] = Eigen::MatrixXd::Identity(part.maps[k].rows(), part.maps[k].rows());
+    }
+    const Eigen::MatrixXd unweighted = free * weight.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd above = unweighted.bottomRows(half.size()),
+                          below = unweighted.topRows(half.size()).colwise().reverse();
+    part.exit_maps = {(above + below) / 2, (above - below) / 2};
+    part.axes.push_back({quantity_of(exit_name(kind)), static_cast<std::uint32_t>(bins), half, {}});
     return part;
 }
 
@@ -111,7 +153,7 @@ Part energy_part(const Table& table) {
 std::size_t Part::component_bytes() const {
     std::size_t bytes = 4 + 4;
     for (const PackedAxis& axis : axes) bytes += 2 * static_cast<std::size_t>(axis.spline.size());
-    return bytes;
+    return bytes * static_cast<std::size_t>(copies());
 }
 
 std::vector<double> exit_breakpoints(TableKind kind, std::size_t bins, std::size_t spans) {
@@ -142,23 +184,44 @@ std::vector<double> exit_breakpoints(TableKind kind, std::size_t bins, std::size
     return points;
 }
 
+namespace {
+
+/// add(table, kind, lobes, their norm, spans) for every kind of lobe, in the order of a pack.
+template <class Add>
+void for_kinds(const Tables& tables, std::size_t phi_spans, std::size_t theta_spans, Add add) {
+    const auto one = [&](const Table& table, TableKind kind, std::size_t spans) {
+        const std::vector<double> lobes = side_lobes(table, kind == TableKind::longitudinal_forward ? 1 : 0);
+        const auto n = static_cast<Eigen::Index>(lobes.size());
+        add(table, kind, lobes, Eigen::Map<const Eigen::VectorXd>(lobes.data(), n).norm(), spans);
+    };
+    if (tables.azimuthal) one(*tables.azimuthal, TableKind::azimuthal, phi_spans);
+    if (tables.longitudinal)
+        for (const TableKind kind : {TableKind::longitudinal_back, TableKind::longitudinal_forward})
+            one(*tables.longitudinal, kind, theta_spans);
+}
+
+}  // namespace
+
 std::vector<Part> parts_of(const Tables& tables, std::size_t phi_spans, std::size_t theta_spans) {
     std::vector<Part> parts;
-    const auto add_lobes = [&](const Table& table, TableKind kind, std::size_t spans) {
-        const std::vector<double> lobes = side_lobes(table, kind == TableKind::longitudinal_forward ? 1 : 0);
-        const double whole =
-            Eigen::Map<const Eigen::VectorXd>(lobes.data(), static_cast<Eigen::Index>(lobes.size())).norm();
-        for (const Mirror mirror : {Mirror::even, Mirror::odd}) {
-            Part part = lobe_part(table, kind, mirror, lobes, whole, spans);
-            if (mirror == Mirror::even || part.share > 1e-6) parts.push_back(std::move(part));
-        }
-    };
-    if (tables.azimuthal) add_lobes(*tables.azimuthal, TableKind::azimuthal, phi_spans);
-    if (tables.longitudinal) {
-        add_lobes(*tables.longitudinal, TableKind::longitudinal_back, theta_spans);
-        add_lobes(*tables.longitudinal, TableKind::longitudinal_forward, theta_spans);
-        parts.push_back(energy_part(*tables.longitudinal));
-    }
+    for_kinds(tables, phi_spans, theta_spans,
+              [&](const Table& table, TableKind kind, const auto& lobes, double whole, std::size_t spans) {
+                  for (const Mirror mirror : {Mirror::even, Mirror::odd}) {
+                      Part part = lobe_part(table, kind, mirror, lobes, whole, spans);
+                      if (mirror == Mirror::even || part.share > 1e-6) parts.push_back(std::move(part));
+                  }
+              });
+    if (tables.longitudinal) parts.push_back(energy_part(*tables.longitudinal));
+    return parts;
+}
+
+std::vector<Part> whole_lobes_of(const Tables& tables, std::size_t phi_spans, std::size_t theta_spans) {
+    std::vector<Part> parts;
+    for_kinds(tables, phi_spans, theta_spans,
+              [&](const Table& table, TableKind kind, const auto& lobes, double whole, std::size_t spans) {
+                  parts.push_back(whole_part(table, kind, lobes, whole, spans));
+              });
+    if (tables.longitudinal) parts.push_back(energy_part(*tables.longitudinal));
     return parts;
 }
 
@@ -166,22 +229,21 @@ PackedTable join(const std::vector<const Part*>& parts, const std::vector<const 
                  std::pair<float, float> range) {
     PackedTable table{parts[0]->kind, parts[0]->axes, {}, models[0]->rank(), range.first, range.second};
     int rank = 0;
-    for (const tensor::CpModel* model : models) rank += model->rank();
+    for (std::size_t p = 0; p < parts.size(); ++p) rank += models[p]->rank() * parts[p]->copies();
     table.weights.resize(rank);
-    for (std::size_t k = 0; k < table.axes.size(); ++k) {
-        PackedAxis& axis = table.axes[k];
-        axis.coefficients.resize(axis.spline.size(), rank);
-        int column = 0;
-        for (std::size_t p = 0; p < parts.size(); ++p) {
-            axis.coefficients.middleCols(column, models[p]->rank()) = parts[p]->maps[k] * models[p]->factors[k];
-            column += models[p]->rank();
+    for (PackedAxis& axis : table.axes) axis.coefficients.resize(axis.spline.size(), rank);
+    int column = 0;
+    for (std::size_t p = 0; p < parts.size(); ++p)
+        for (int copy = 0; copy < parts[p]->copies(); ++copy) {
+            const tensor::CpModel& model = *models[p];
+            for (std::size_t k = 0; k < table.axes.size(); ++k) {
+                const Eigen::MatrixXd& map =
+                    k < parts[p]->maps.size() ? parts[p]->maps[k] : parts[p]->exit_maps[static_cast<std::size_t>(copy)];
+                table.axes[k].coefficients.middleCols(column, model.rank()) = map * model.factors[k];
+            }
+            table.weights.segment(column, model.rank()) = model.weights;
+            column += model.rank();
         }
-    }
-    int from = 0;
-    for (const tensor::CpModel* model : models) {
-        table.weights.segment(from, model->rank()) = model->weights;
-        from += model->rank();
-    }
     return table;
 }
 

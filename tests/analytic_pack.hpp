@@ -200,7 +200,7 @@ inline TableSpec azimuthal_table(int harmonics = 15, int phi_spans = 48) {
     TableSpec spec = {TableKind::azimuthal, harmonics + 1, harmonics, {}};
     const int last = harmonics;
     spec.axes.push_back(
-        {Quantity::sigma, even(0, 16, 12), [=](int r, double x) { return r == last ? 1 : std::exp(-0.1 * x * r); }});
+        {Quantity::sigma, even(0, 4, 24), [=](int r, double c) { return r == last ? 1 : std::exp(-0.1 * c * c * r); }});
     spec.axes.push_back(
         {Quantity::g, even(-0.95, 0.95, 24), [=](int r, double x) { return r == last ? x * x - 1 : std::pow(x, r); }});
     spec.axes.push_back(
@@ -219,11 +219,12 @@ inline double longitudinal_density(bool back, double g, double theta_i, double t
 
 inline TableSpec longitudinal_table(bool back, int rank = 2) {
     TableSpec spec = {back ? TableKind::longitudinal_back : TableKind::longitudinal_forward, rank, 1, {}};
-    spec.axes.push_back({Quantity::sigma, even(0, 16, 12), [](int, double) { return 1.0; }});
+    spec.axes.push_back({Quantity::sigma, even(0, 4, 12), [](int, double) { return 1.0; }});
     spec.axes.push_back({Quantity::g, even(-0.95, 0.95, 24),
                          [=](int r, double x) { return r == 1 ? (back ? -0.3 : -0.9 * x - 0.05) : 1.0; }});
-    spec.axes.push_back(
-        {Quantity::theta_i, even(0, pi / 2, 12), [](int r, double x) { return r == 1 ? std::sin(x) : 1.0; }});
+    spec.axes.push_back({Quantity::theta_i, even(0, 1, 12), [](int r, double c) {
+                             return r == 1 ? std::sin(from_spline_coordinate(Quantity::theta_i, c)) : 1.0;
+                         }});
     spec.axes.push_back({Quantity::theta_r, even(0, pi / 2, 12),
                          [](int r, double x) { return r > 1 ? 0.0 : std::cos(x) / 2 * (r == 1 ? std::sin(x) : 1.0); }});
     return spec;

@@ -39,7 +39,7 @@ TEST_CASE("Spline weights are non-negative and sum to 1", "[axis]") {
 TEST_CASE("A spline through nodes reproduces its nodes, and polynomials of its degree", "[axis]") {
     for (const std::vector<double>& nodes :
          {std::vector<double>{0.3}, {0, 1}, {0, 0.2, 1}, {0, 0.1, 0.4, 1}, {0, 0.1, 0.4, 1, 2, 2.5}}) {
-        const Spline spline = Spline::through(Quantity::sigma, nodes);
+        const Spline spline = Spline::through(Quantity::g, nodes);
         const int degree = std::min<int>(3, static_cast<int>(nodes.size()) - 1);
         Eigen::VectorXd values(static_cast<Eigen::Index>(nodes.size()));
         const auto f = [&](double x) { return std::pow(x - 0.7, degree) + 1; };
@@ -77,7 +77,7 @@ TEST_CASE("Mirrored splines are even or odd about their ends, and reach every su
 TEST_CASE("A spline through nodes of an even or odd function is even or odd", "[axis]") {
     for (const std::vector<double>& nodes : {std::vector<double>{0, 1}, {0, 0.4, 1}, {0, 0.2, 0.5, 0.8, 1}}) {
         for (const Mirror mirror : {Mirror::even, Mirror::odd}) {
-            const Spline spline = Spline::through(Quantity::theta_i, nodes, mirror);
+            const Spline spline = Spline::through(Quantity::g, nodes, mirror);
             Eigen::VectorXd values(static_cast<Eigen::Index>(nodes.size()));
             const auto f = [&](double x) { return mirror == Mirror::even ? 2 - 0.7 * x * x : 1.3 * x; };
             for (std::size_t i = 0; i < nodes.size(); ++i) values[static_cast<Eigen::Index>(i)] = f(nodes[i]);
@@ -108,6 +108,16 @@ TEST_CASE("The spline coordinate of h is tan(asin(h) / 2) to the last digits at 
         CHECK(c == Approx(std::tan(std::asin(h) / 2)).epsilon(1e-8));  // asin loses half its digits at 1
         CHECK(from_spline_coordinate(Quantity::h, c) == Approx(h).epsilon(1e-15));
     }
+}
+
+TEST_CASE("Every spline coordinate has its inverse, and holds where rounding leaves the axis", "[axis]") {
+    for (const Quantity q : {Quantity::sigma, Quantity::g, Quantity::h, Quantity::theta_i})
+        for (const double x : {0.0, 1e-12, 0.25, 0.999, 1.0}) {
+            CHECK(from_spline_coordinate(q, spline_coordinate(q, x)) == Approx(x).epsilon(1e-14));
+            if (x > 0) CHECK(spline_coordinate(q, x) > spline_coordinate(q, 0.9 * x));
+        }
+    CHECK(spline_coordinate(Quantity::theta_i, float(pi / 2)) >= 0.999999f);  // float(pi/2) lies above pi/2
+    CHECK(spline_coordinate(Quantity::theta_i, 1.6f) > 1);                    // beyond the end, whose value holds
 }
 
 TEST_CASE("Ranges: what is read and what is refused", "[axis]") {

@@ -22,18 +22,26 @@ enum class Quantity : std::uint32_t {
 };
 inline constexpr std::uint32_t quantity_count = 7;
 
-/// The variable in which lobes are smooth, and in which splines run: the quantity itself, but for offsets
-/// tan(asin(h) / 2) = h / (1 + sqrt(1 - h^2)), since lobes have the square-root behaviour of the chord at h = 1.
+/// The variable in which lobes are smooth, and in which splines run: the quantity itself, but for
+/// - optical radii, sqrt(sigma): near grazing exits lobes change with sigma / cos theta_r, over every scale of sigma;
+/// - offsets, tan(asin(h) / 2) = h / (1 + sqrt(1 - h^2)), since lobes have the square-root behaviour of the chord;
+/// - inclinations, the same of u = theta_i / (pi/2), since near grazing lobes change as (1 - u) log(1 - u).
 template <class T>
 MEDULLA_FN T spline_coordinate(Quantity quantity, T x) noexcept {
-    if (quantity != Quantity::h) return x;
-    return x / (T(1) + std::sqrt((T(1) - x) * (T(1) + x)));
+    if (quantity == Quantity::sigma || quantity == Quantity::absorption) return std::sqrt(x);
+    if (quantity != Quantity::h && quantity != Quantity::theta_i) return x;
+    const T u = quantity == Quantity::h ? x : x * T(2 / pi);
+    const T below = T(1) - u;  // below 0 by the rounding of pi/2, or outside the axis, whose end holds there
+    return u / (T(1) + std::sqrt((below < T(0) ? T(0) : below) * (T(1) + u)));
 }
 
 /// Inverse of spline_coordinate.
 template <class T>
 MEDULLA_FN T from_spline_coordinate(Quantity quantity, T c) noexcept {
-    return quantity != Quantity::h ? c : T(2) * c / (T(1) + c * c);
+    if (quantity == Quantity::sigma || quantity == Quantity::absorption) return c * c;
+    if (quantity != Quantity::h && quantity != Quantity::theta_i) return c;
+    const T u = T(2) * c / (T(1) + c * c);
+    return quantity == Quantity::h ? u : u * T(pi / 2);
 }
 
 /// A breakpoint and the reciprocals that the de Boor recurrence divides by.

@@ -75,7 +75,7 @@ void bench_lookups(const PackView& pack, const std::string& label) {
     Contraction c;
     const auto q = queries(4096);
     contract(material, 2.0f, 0.3f, c);
-    const std::string rank = "rank " + std::to_string(view.layout.rank) + label;
+    const std::string rank = "rank " + std::to_string(view.layout.even_rank + view.layout.odd_rank) + label;
     report("lookup of a prepared lobe, " + rank,
            nanoseconds(int(q.size()),
                        [&] {

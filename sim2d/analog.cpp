@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "sim2d/elementary.hpp"
+
 namespace medulla::sim2d {
 namespace {
 
@@ -21,14 +23,14 @@ void check(double sigma, double g, std::size_t bins, const TraceOptions& options
 }
 
 /// Free flight with collision density sigma exp(-sigma t). sigma = 0 flies for ever.
-double free_flight(double sigma, RandomStream& random) { return -std::log(random.uniform()) / sigma; }
+double free_flight(double sigma, RandomStream& random) { return -portable::log(random.uniform()) / sigma; }
 
 /// First flight conditioned to collide within `length`: t = -log(1 - u (1 - exp(-sigma L))) / sigma -> u L.
 double forced_flight(double sigma, double length, RandomStream& random) {
     const double u = random.uniform(), tau = sigma * length;
     if (!(tau > 0)) return u * std::min(length, std::numeric_limits<double>::max());
-    if (std::isinf(tau)) return -std::log(u) / sigma;
-    return std::min(-std::log1p(u * std::expm1(-tau)) / sigma, length);
+    if (std::isinf(tau)) return -portable::log(u) / sigma;
+    return std::min(-portable::log1p(u * portable::expm1(-tau)) / sigma, length);
 }
 
 /// Distance from a point of the disc to the circle along a unit direction, >= 0.
@@ -63,6 +65,33 @@ double share_error(double hits, double n) {
     const double q = (hits + 0.5) / (n + 1);
     return std::sqrt(q * (1 - q) / n);
 }
+
+/// The same for paths of weight w <= 1 in a medium that absorbs: sums of w, w^2 and w times the length.
+struct Weights {
+    explicit Weights(std::size_t bins) : sum(bins, 0), square(bins, 0) {}
+    std::vector<double> sum, square;
+    double total = 0, squares = 0, length = 0, paths = 0;
+
+    void add(std::size_t b, double path_length, double w) {
+        sum[b] += w, square[b] += w * w;
+        total += w, squares += w * w, length += w * path_length, ++paths;
+    }
+
+    Profile profile(double width) const {
+        Profile p;
+        p.standard_error = 1;
+        if (!(total > 0)) return p;
+        double variance = 0, norm = 0;
+        for (std::size_t b = 0; b < sum.size(); ++b) {
+            p.lobe.push_back(sum[b] / (total * width));
+            variance += square[b] - sum[b] * sum[b] / paths;
+            norm += sum[b] * sum[b];
+        }
+        p.standard_error = std::sqrt(variance / norm);
+        p.mean_length = length / total;
+        return p;
+    }
+};
 
 struct Counts {
     explicit Counts(std::size_t bins) : bin(bins, 0) {}
@@ -113,22 +142,38 @@ Profile trace_disc(double sigma, double g, double h, std::size_t bins, const Tra
     check(sigma, g, bins, options);
     require(h >= -1 && h <= 1, "h: expected a value in [-1, 1]");
     const double half = std::sqrt((1 - h) * (1 + h)), chord = 2 * half;
+    require(std::isfinite(options.absorption) && options.absorption >= 0, "absorption: expected a finite value >= 0");
     Counts counts(bins);
+    Weights weights(bins);
+    const bool absorbs = options.absorption > 0, forced = options.first == FirstCollision::forced;
     for (std::uint64_t path = 0; path < options.paths; ++path) {
         RandomStream random(options.seed, options.cell, path);
-        const bool forced = options.first == FirstCollision::forced;
         const double t = forced ? forced_flight(sigma, chord, random) : free_flight(sigma, random);
         if (!forced && !(t < chord)) continue;  // unscattered: not in the table
         Ray ray{-half, h, {1, 0}};
         advance(ray, t);
         scatter(ray, g, random);
         const Exit exit = walk_disc(ray, sigma, g, random);
-        const double phi = std::atan2(exit.ray.direction.y, exit.ray.direction.x);
-        counts.add(bin_of(phi, -pi, pi, bins), t + exit.length);
+        const double phi = portable::atan2(exit.ray.direction.y, exit.ray.direction.x);
+        const std::size_t bin = bin_of(phi, -pi, pi, bins);
+        const double length = t + exit.length;
+        if (absorbs)
+            weights.add(bin, length, portable::exp(-options.absorption * length));
+        else
+            counts.add(bin, length);
     }
-    Profile profile = counts.profile(2 * pi / static_cast<double>(bins));
-    profile.energy = -std::expm1(-sigma * chord);
-    if (options.first == FirstCollision::analog) {
+    const double width = 2 * pi / static_cast<double>(bins);
+    if (absorbs) {
+        Profile profile = weights.profile(width);
+        const auto n = static_cast<double>(options.paths);
+        const double mean = weights.total / n, scale = forced ? -portable::expm1(-sigma * chord) : 1;
+        profile.energy = scale * mean;
+        profile.energy_error = scale * std::sqrt(std::max(0.0, weights.squares / n - mean * mean) / n);
+        return profile;
+    }
+    Profile profile = counts.profile(width);
+    profile.energy = -portable::expm1(-sigma * chord);
+    if (!forced) {
         const auto n = static_cast<double>(options.paths);
         profile.energy = static_cast<double>(counts.total) / n;
         profile.energy_error = share_error(static_cast<double>(counts.total), n);
@@ -141,7 +186,7 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
     require(theta_i >= -pi / 2 && theta_i <= pi / 2, "theta_i: expected a value in [-pi/2, pi/2]");
     // x is the depth below the lit face; the light travels along (cos theta_i, -sin theta_i), so that it comes from
     // inclination theta_i. It leaves at theta_r = asin(direction.y): the straight continuation is theta_r = -theta_i.
-    const double mu = theta_i == pi / 2 || theta_i == -pi / 2 ? 0.0 : std::cos(theta_i);
+    const double mu = theta_i == pi / 2 || theta_i == -pi / 2 ? 0.0 : portable::cos(theta_i);
     const double chord = mu > 0 ? 2 / mu : std::numeric_limits<double>::infinity();
     Counts back(bins_per_side), forward(bins_per_side);
     for (std::uint64_t path = 0; path < options.paths; ++path) {
@@ -150,7 +195,7 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
         double t = forced ? forced_flight(sigma, chord, random) : free_flight(sigma, random);
         if (!forced && !(t < chord)) continue;
         double x = std::min(t * mu, 2.0), length = t;
-        Ray ray{x, 0, {mu, -std::sin(theta_i)}};
+        Ray ray{x, 0, {mu, -portable::sin(theta_i)}};
         for (;;) {
             scatter(ray, g, random);
             t = free_flight(sigma, random);
@@ -159,7 +204,7 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
             if (!(t < to_face)) {
                 // c = 0 and sigma = 0: the ray never leaves; it has probability 0, and an exit angle of +-90 degrees.
                 length += std::min(to_face, std::numeric_limits<double>::max());
-                const double theta_r = std::atan2(ray.direction.y, std::abs(c));
+                const double theta_r = portable::atan2(ray.direction.y, std::abs(c));
                 (c < 0 ? back : forward).add(bin_of(theta_r, -pi / 2, pi / 2, bins_per_side), length);
                 break;
             }
@@ -171,7 +216,7 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
     SlabProfile profile{back.profile(width), forward.profile(width), 0};
     const auto scattered = static_cast<double>(back.total + forward.total), n = static_cast<double>(options.paths);
     const bool forced = options.first == FirstCollision::forced;
-    const double total = forced ? -std::expm1(-sigma * chord) : scattered / n;
+    const double total = forced ? -portable::expm1(-sigma * chord) : scattered / n;
     const auto share = [&](Profile& p, std::uint64_t count) {
         if (!(sigma > 0) || !(scattered > 0)) return;
         p.energy = static_cast<double>(count) / scattered * total;

@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <map>
-#include <mutex>
 #include <stdexcept>
-#include <tuple>
+#include <utility>
 
 #include "sim2d/disc_grid.hpp"
 #include "sim2d/disc_single.hpp"
-#include "sim2d/disc_transport.hpp"
+#include "sim2d/disc_solve.hpp"
 
 namespace medulla::sim2d {
 namespace {
@@ -22,35 +20,58 @@ void require(bool condition, const char* what) {
     if (!condition) throw std::invalid_argument(what);
 }
 
-/// Coefficients c_k / E at the offset h, by a polynomial in asin h through the eight nearest chords, those of -h
-/// included: I(-b, -phi) = I(b, phi). Near |h| = 1 the stencil ends at the tangent chord.
-std::vector<Complex> at_offset(const DiscExit& exit, double h) {
-    const std::size_t count = exit.offset.size(), taps = std::min<std::size_t>(8, 2 * count);
-    // Chord t of -count .. count - 1: mirrored for t < 0.
+/// Polynomial in asin h through the eight nearest chords, those of -h included: chord t of -count .. count - 1 is
+/// mirrored for t < 0. Near |h| = 1 the stencil ends at the tangent chord.
+struct Stencil {
+    std::ptrdiff_t start;
+    std::vector<double> weight;
+
+    static std::size_t chord(std::ptrdiff_t t) { return static_cast<std::size_t>(t < 0 ? -1 - t : t); }
+};
+
+Stencil stencil_at(const std::vector<double>& offset, double h) {
+    const std::size_t count = offset.size(), taps = std::min<std::size_t>(8, 2 * count);
     const auto beta = [&](std::ptrdiff_t t) {
-        return t < 0 ? -std::asin(exit.offset[static_cast<std::size_t>(-1 - t)])
-                     : std::asin(exit.offset[static_cast<std::size_t>(t)]);
+        return t < 0 ? -std::asin(offset[Stencil::chord(t)]) : std::asin(offset[Stencil::chord(t)]);
     };
     const double x = std::asin(std::abs(h));
-    const auto above = std::upper_bound(exit.offset.begin(), exit.offset.end(), std::abs(h)) - exit.offset.begin();
-    const auto start = std::min<std::ptrdiff_t>(above - static_cast<std::ptrdiff_t>(taps / 2),
-                                                static_cast<std::ptrdiff_t>(count - taps));
-    std::vector<Complex> c(exit.modes);
+    const auto above = std::upper_bound(offset.begin(), offset.end(), std::abs(h)) - offset.begin();
+    Stencil s;
+    s.start = std::min<std::ptrdiff_t>(above - static_cast<std::ptrdiff_t>(taps / 2),
+                                       static_cast<std::ptrdiff_t>(count - taps));
     for (std::size_t a = 0; a < taps; ++a) {
-        const std::ptrdiff_t t = start + static_cast<std::ptrdiff_t>(a);
+        const std::ptrdiff_t t = s.start + static_cast<std::ptrdiff_t>(a);
         double weight = 1;
         for (std::size_t o = 0; o < taps; ++o)
-            if (const std::ptrdiff_t u = start + static_cast<std::ptrdiff_t>(o); u != t)
+            if (const std::ptrdiff_t u = s.start + static_cast<std::ptrdiff_t>(o); u != t)
                 weight *= (x - beta(u)) / (beta(t) - beta(u));
-        const std::size_t chord = static_cast<std::size_t>(t < 0 ? -1 - t : t);
+        s.weight.push_back(weight);
+    }
+    return s;
+}
+
+/// What leaves at the offset h, over the energy of the first collisions: I(-b, -phi) = I(b, phi).
+struct Light {
+    std::vector<Complex> c;
+    double rest = 0;  ///< mean path after the first collision
+};
+
+Light at_offset(const DiscExit& exit, double h) {
+    const Stencil stencil = stencil_at(exit.offset, h);
+    Light light;
+    light.c.resize(exit.modes);
+    for (std::size_t a = 0; a < stencil.weight.size(); ++a) {
+        const std::ptrdiff_t t = stencil.start + static_cast<std::ptrdiff_t>(a);
+        const std::size_t chord = Stencil::chord(t);
+        light.rest += stencil.weight[a] * exit.rest[chord];
         for (std::size_t k = 0; k < exit.modes; ++k) {
             const Complex value = exit.lobes[chord * exit.modes + k];
-            c[k] += weight * (t < 0 ? std::conj(value) : value);
+            light.c[k] += stencil.weight[a] * (t < 0 ? std::conj(value) : value);
         }
     }
     if (h < 0)
-        for (Complex& value : c) value = std::conj(value);
-    return c;
+        for (Complex& value : light.c) value = std::conj(value);
+    return light;
 }
 
 /// Adds the bin averages of c_0 + 2 Re sum c_k exp(i k phi) to a lobe: mode k is damped by sinc(k w / 2).
@@ -73,95 +94,113 @@ void add_modes(const std::vector<Complex>& c, std::vector<double>& lobe) {
     }
 }
 
-/// Measured, for 1e-3 or better over sigma <= 16, 0 <= g <= 0.95: the radial step follows the layer 1 / sigma under the
-/// rim, the gap the width of the phase function (wider where many collisions blur), the modes both.
-DiscGridSize automatic(double sigma, double g, const DiscOptions& options) {
-    const double width = 1 - std::abs(g), root = std::sqrt(sigma);
+/// Measured (docs/accuracy.md), for sigma <= 16 and |g| <= 0.95. Errors fall like the third power of all steps.
+/// Scattering makes the source under the rim behave like z log z over a depth z = rim^2 / 2; light that is scattered
+/// twice carries modes of g^(2 k).
+DiscGridSize automatic(double sigma, double sigma_a, double g, const DiscOptions& options) {
+    const double scale = std::cbrt(options.target_error / 1e-3), depth = std::min(sigma + sigma_a, 40.0);
     DiscGridSize size;
-    size.circles = options.circles > 0 ? options.circles : 18 + static_cast<int>(8 * std::min(root, 8.0));
-    size.gap = options.gap > 0 ? options.gap : std::clamp(0.7 * width * (1 + sigma / 8), 0.03, 0.25);
-    const double modes = 23 + 5 * std::min(root, 8.0) + 2.3 * std::min(1 / width, 40.0);
-    size.modes = options.modes > 0 ? options.modes : static_cast<int>(modes / 8) * 8 + 7;
+    size.circles = options.circles > 0 ? options.circles : static_cast<int>(std::ceil((8 + depth) / scale));
+    size.gap = options.gap > 0 ? options.gap : std::min(0.3 * scale, 0.4);
+    size.rim = options.rim > 0 ? options.rim : 0.003 * scale * std::sqrt(16 / std::clamp(depth, 1.0, 16.0));
+    size.growth = 1 + scale * (0.17 + 0.13 * std::exp(-depth / 4));
+    const double visible = 0.6 * options.target_error / std::min(sigma, 1.0);
+    const double tail = g == 0 || visible >= 1 ? 0 : std::log(visible) / (2 * std::log(std::abs(g)));
+    // Near the tangent the lobe has a kink at phi = 0, softened by g only: algebraic in the modes.
+    const double kink =
+        (19 + 5 * std::min(std::sqrt(depth), 8.0)) * (1 + std::max(0.0, 3 * std::abs(g) - 1.5)) / std::max(scale, 0.5);
+    const double modes = std::min(std::max(kink, tail), 200.0);
+    size.modes = options.modes > 0 ? options.modes : static_cast<int>(modes / 8) * 8 + 6;
     return size;
 }
 
-DiscGridSize coarser(const DiscGridSize& size) { return {size.circles * 2 / 3, size.modes * 3 / 4, size.gap * 1.3}; }
+const double coarsening = 1.4;
 
-/// The error of a grid falls about as the third power of the radial step and the fifth of the gap: what the coarse grid
-/// misses is 1.5^3 (1.3^5) times what the fine one does, so fine + (fine - coarse) / (1.5^3 - 1) cancels most of it.
-/// Measured: it gains 2 to 10 where the layer under the rim rules the error, and loses where the peak of p does.
-double extrapolation(double sigma, double g) {
-    return sigma * (1 - std::abs(g)) >= 0.3 ? 1 / (1.5 * 1.5 * 1.5 - 1) : 0;
+DiscGridSize coarser(const DiscGridSize& size) {
+    const auto rounded = [](double x, int least) { return std::max(least, static_cast<int>(x)); };
+    return {rounded(size.circles / coarsening, 4), rounded(size.modes * 0.75, 8), std::min(size.gap * coarsening, 0.5),
+            size.rim * coarsening, 1 + (size.growth - 1) * coarsening};
+}
+
+/// Third order: a coarse grid misses coarsening^3 times what the fine one does. Error of the fine grid over the
+/// difference of the two.
+const double share = 1 / (coarsening * coarsening * coarsening - 1);
+
+/// Mean of t over the first collisions exp(-extinction t) on a chord: length (1 / tau - 1 / (exp(tau) - 1)).
+double mean_first_flight(double extinction, double length) {
+    const double tau = extinction * length;
+    if (tau < 0.3) return length * (0.5 - tau / 12 * (1 - tau * tau / 60 * (1 - tau * tau / 42)));
+    return length * (1 / tau - 1 / std::expm1(tau));
 }
 
 }  // namespace
 
-struct DiscSolver::Shared {
-    double g;
-    DiscOptions options;
-    std::mutex mutex;
-    std::map<std::tuple<int, int, double>, std::shared_ptr<const DiscGrid>> grids;
-
-    std::shared_ptr<const DiscGrid> grid(const DiscGridSize& size) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        auto& entry = grids[{size.circles, size.modes, size.gap}];
-        if (!entry) entry = std::make_shared<const DiscGrid>(g, size);
-        return entry;
-    }
-};
-
-DiscSolver::DiscSolver(double g, const DiscOptions& options) : shared_(std::make_unique<Shared>()) {
+DiscSolver::DiscSolver(double g, const DiscOptions& options) : g_(g), options_(options) {
     require(g > -1 && g < 1, "g: expected a value in (-1, 1)");
     require(options.circles == 0 || options.circles >= 6, "circles: expected at least 6, or 0");
     require(options.modes == 0 || options.modes >= 8, "modes: expected at least 8, or 0");
+    require(options.target_error >= 1e-6 && options.target_error <= 0.1, "target_error: expected 1e-6 to 0.1");
+    require(options.rim >= 0, "rim: expected an angle > 0, or 0");
     require(options.gap >= 0, "gap: expected an angle > 0, or 0");
-    shared_->g = g;
-    shared_->options = options;
 }
 
-DiscSolver::~DiscSolver() = default;
-DiscSolver::DiscSolver(DiscSolver&&) noexcept = default;
-DiscSolver& DiscSolver::operator=(DiscSolver&&) noexcept = default;
-
 std::vector<Profile> DiscSolver::solve(double sigma, const std::vector<double>& h, std::size_t bins) const {
+    return solve(sigma, 0, h, bins);
+}
+
+std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::vector<double>& h,
+                                       std::size_t bins) const {
     require(std::isfinite(sigma) && sigma >= 0, "sigma: expected a finite value >= 0");
+    require(std::isfinite(sigma_a) && sigma_a >= 0, "sigma_a: expected a finite value >= 0");
     require(bins > 0, "bins: expected at least one");
     for (const double offset : h) require(offset >= -1 && offset <= 1, "h: expected a value in [-1, 1]");
-    const DiscGridSize size = automatic(sigma, shared_->g, shared_->options);
+    const double extinction = sigma + sigma_a;
+    const DiscGridSize size = automatic(sigma, sigma_a, g_, options_);
     const double width = 2 * pi / static_cast<double>(bins);
-    DiscExit fine, coarse;
-    const bool two_grids = shared_->options.estimate_error && sigma > 0;
-    if (sigma > 0) fine = solve_disc_transport(*shared_->grid(size), sigma);
-    if (two_grids) coarse = solve_disc_transport(*shared_->grid(coarser(size)), sigma);
-    const double ahead = extrapolation(sigma, shared_->g);
+    // Everything is divided by the energy of the first collisions, so a limit sigma -> 0 is a solve at a sigma that
+    // adds nothing to it in double precision.
+    const double visible = std::max(sigma, 1e-30), tolerance = 0.02 * std::min(options_.target_error, 1e-3);
+    const bool two_grids = options_.estimate_error;
+    DiscExit coarse;
+    const DiscExit fine = solve_disc_transport(DiscGrid(g_, size), visible, sigma_a, tolerance);
+    if (two_grids) coarse = solve_disc_transport(DiscGrid(g_, coarser(size)), visible, sigma_a, tolerance);
     std::vector<Profile> profiles;
     for (const double offset : h) {
         Profile profile;
-        profile.energy = disc_energy(sigma, offset);
-        profile.lobe = disc_single_lobe(sigma, shared_->g, offset, bins);
-        std::vector<double> difference(bins);
-        if (sigma > 0) {
-            std::vector<Complex> c = at_offset(fine, offset);
-            if (two_grids) {
-                std::vector<Complex> d = at_offset(coarse, offset);
-                d.resize(c.size());
-                for (std::size_t k = 0; k < c.size(); ++k) {
-                    d[k] = c[k] - d[k];
-                    c[k] += ahead * d[k];
-                }
-                add_modes(d, difference);
+        const double chord = 2 * std::sqrt((1 - offset) * (1 + offset));
+        const double collided = sigma > 0 ? disc_energy(extinction, offset) * (sigma / extinction) : 0;
+        profile.lobe = disc_single_lobe(extinction, g_, offset, bins);
+        double single = 0;
+        for (const double x : profile.lobe) single += x * width;
+        const Light light = at_offset(fine, offset);
+        // The fraction of collided light that leaves, twice: as integral of the lobe, and as what is not absorbed on
+        // the way. Each is used where it keeps its digits.
+        const auto leaves = [&](const Light& l) {
+            const double lobe = single + 2 * pi * l.c[0].real(), path = 1 - sigma_a * l.rest;
+            return std::pair{lobe, path * path + (1 - path) * lobe};
+        };
+        const auto [integral, fraction] = leaves(light);
+        profile.energy = collided * fraction;
+        profile.energy_error = std::abs(integral - (1 - sigma_a * light.rest)) * collided;
+        if (sigma_a == 0) profile.mean_length = mean_first_flight(sigma, chord) + light.rest;
+        add_modes(light.c, profile.lobe);
+        if (two_grids) {
+            Light difference = at_offset(coarse, offset);
+            if (sigma_a > 0) profile.energy_error = share * std::abs(fraction - leaves(difference).second) * collided;
+            difference.c.resize(light.c.size());
+            for (std::size_t k = 0; k < light.c.size(); ++k) difference.c[k] -= light.c[k];
+            std::vector<double> lobe(bins);
+            add_modes(difference.c, lobe);
+            double square = 0, error = 0;
+            for (std::size_t b = 0; b < bins; ++b) {
+                square += profile.lobe[b] * profile.lobe[b];
+                error += lobe[b] * lobe[b];
             }
-            add_modes(c, profile.lobe);
+            profile.standard_error = share * std::sqrt(error / square) + (sigma > 0 ? fine.residual : 0);
         }
-        double sum = 0, square = 0, error = 0;
-        for (std::size_t b = 0; b < bins; ++b) {
-            sum += profile.lobe[b];
-            square += profile.lobe[b] * profile.lobe[b];
-            error += difference[b] * difference[b];
-        }
-        profile.energy_error = std::abs(sum * width - 1) * profile.energy;
-        profile.standard_error = two_grids ? std::sqrt(error / square) + fine.residual : 0;
-        for (double& x : profile.lobe) x /= sum * width;
+        double sum = 0;
+        for (const double x : profile.lobe) sum += x * width;
+        for (double& x : profile.lobe) x /= sum;
         profiles.push_back(std::move(profile));
     }
     return profiles;

@@ -1,23 +1,28 @@
-// Conjugate points of the disc solver: circles, the chords between them, and one scattering matrix per circle.
+// Conjugate points of the disc solver: circles, the chords between them, and the harmonics of scattering per circle.
 // docs/physics.md, section 2; the symmetries that make the matrices small are stated below.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
 namespace medulla::sim2d {
 
-/// Which grid. Circles r_i = sin(pi i / (2 circles)) crowd to the rim. The ring between two circles holds chords that
-/// are uniform in angle on its outer circle, 2 at least and no further apart than `gap`: this is what resolves grazing
-/// directions, and the turn of a mode near the centre, exp(-i k psi) where the radiance hardly depends on place.
+/// Which grid. Circles r_i = cos x_i: x grows from the rim, in steps that begin at `rim` and widen by
+/// `growth` each up to pi / (2 circles).
+/// The ring between two circles holds chords that are uniform in angle on its outer circle, 2 at least and no further
+/// apart than `gap`; the last touches the outer circle.
 struct DiscGridSize {
     int circles = 0, modes = 0;
-    double gap = 0;  ///< [radians]
+    double gap = 0, rim = 0;  ///< [radians]
+    double growth = 1.2;
 };
 
-/// The parts of a mode J_k(r, psi) under its two symmetries. Light along x makes the problem even in y, which makes
-/// the real part of a mode even in psi and the imaginary part odd; scattering also commutes with psi -> pi - psi
-/// (sum and difference). So psi in (0, pi / 2) is enough: chord b meets circle r at psi = asin(b / r) and pi - psi.
+/// A field I(r, alpha, omega) = sum over k of exp(i k omega) I_k(r, psi), psi = alpha - omega: at a fixed direction it
+/// is as smooth in place as light is, however narrow the phase function. Light along x makes the problem even in y:
+/// Re I_k is even in psi, Im I_k odd, and I_k = sum over m of a_m exp(i m psi) with real a_m, which scattering
+/// multiplies by g^|m - k|. Halves that are even (sum) and odd (difference) about psi = pi / 2 have even or odd m only,
+/// so psi in (0, pi / 2) is enough: chord b meets circle r at psi = asin(b / r) and pi - psi.
 enum DiscPart { real_sum, real_difference, imaginary_sum, imaginary_difference, disc_parts };
 
 /// Fields and matrices of the solve: rounding of 1e-7 is far below what the grids leave (1e-4), and half the memory
@@ -30,33 +35,42 @@ class DiscGrid {
     DiscGrid(double g, const DiscGridSize& size);
 
     DiscGridSize size;
-    std::vector<double> radius;          ///< of circle i, increasing, the last is 1
-    std::vector<double> offset;          ///< b of chord m, increasing; chords [0, chords(i)) meet circle i
-    std::vector<std::size_t> ring;       ///< first circle that chord m meets
-    std::vector<std::size_t> first;      ///< first[i] + m: node of circle i on chord m; first[circles] = node count
-    std::vector<double> psi;             ///< per node, in (0, pi / 2)
-    std::vector<DiscReal> cosine, sine;  ///< cos(k psi), sin(k psi): node-major, `stride` columns
-    std::size_t stride;                  ///< modes 0..size.modes, rounded up to a multiple of 8 (all are solved for)
-    int harmonics;                       ///< highest n kept in psi: |g|^n < 1e-8 beyond
+    std::vector<double> radius;      ///< of circle i, increasing, the last is 1
+    std::vector<double> offset;      ///< b of chord m, increasing; chords [0, chords(i)) meet circle i
+    std::vector<std::size_t> ring;   ///< first circle that chord m meets
+    std::vector<std::size_t> first;  ///< first[i] + m: node of circle i on chord m; first[circles] = node count
+    std::vector<double> psi;         ///< per node, in (0, pi / 2]
+    std::size_t stride;              ///< columns: path length, then modes 0, 1, ..; a multiple of 8
+    int reach;                       ///< highest m: |g|^|m - k| < 1e-7 beyond, for every k
 
+    /// Column 0 is the path length of uniform light (k = 0), the others are modes of the plane wave.
+    static std::size_t mode_of(std::size_t column) { return column == 0 ? 0 : column - 1; }
     std::size_t circles() const { return radius.size(); }
     std::size_t nodes() const { return psi.size(); }
-    /// Number of chords that meet circle i; circle i has as many nodes with psi < pi / 2.
+    bool tangent(std::size_t m) const { return offset[m] == radius[ring[m]]; }
+    /// Number of chords that meet circle i; circle i has as many nodes with psi <= pi / 2.
     std::size_t chords(std::size_t i) const { return first[i + 1] - first[i]; }
-    /// Row-major chords(i) x chords(i): values of a part at the nodes of circle i -> (p * part) at the same nodes.
-    /// Empty where few harmonics matter; then it is waves(i, part) times analysis(i, part).
-    const std::vector<DiscReal>& scatter(std::size_t i, DiscPart part) const { return scatter_[i * disc_parts + part]; }
-    /// Row-major chords(i) x harmonics of the part: g^n cos(n psi) or g^n sin(n psi).
-    const std::vector<DiscReal>& waves(std::size_t i, DiscPart part) const { return waves_[i * disc_parts + part]; }
-    /// Row-major harmonics of the part x chords(i): values at the nodes -> cosine or sine coefficients.
-    const std::vector<DiscReal>& analysis(std::size_t i, DiscPart part) const {
-        return analysis_[i * disc_parts + part];
+    /// Harmonics m = 2 j + parity(part), j < harmonics(i), are kept of a field on circle i: as many as it has nodes.
+    std::size_t harmonics(std::size_t i) const { return std::min(chords(i), all_harmonics()); }
+    std::size_t all_harmonics() const { return static_cast<std::size_t>(reach) / 2 + 1; }
+    static int parity(int part) { return part == real_difference || part == imaginary_sum ? 1 : 0; }
+    static bool is_cosine(int part) { return part == real_sum || part == real_difference; }
+    /// Row-major chords(i) x all_harmonics(): cos(m psi) or sin(m psi) at the nodes.
+    const std::vector<DiscReal>& waves(std::size_t i, int part) const {
+        return waves_[i * disc_parts + static_cast<std::size_t>(part)];
     }
-    /// The harmonics n of a part, in steps of two.
-    std::vector<int> harmonics_of(DiscPart part) const;
+    /// Row-major harmonics(i) x chords(i): values at the nodes -> cosine or sine coefficients.
+    const std::vector<DiscReal>& analysis(std::size_t i, int part) const {
+        return analysis_[i * disc_parts + static_cast<std::size_t>(part)];
+    }
+    /// (g^|m - k| + g^|m + k|) / 2 and (g^|m - k| - g^|m + k|) / 2, `stride` columns per m: what scattering makes of
+    /// cosine and sine coefficients, (c, s) -> (even c + odd s, odd c + even s).
+    const DiscReal* even(int m) const { return &even_[static_cast<std::size_t>(m) * stride]; }
+    const DiscReal* odd(int m) const { return &odd_[static_cast<std::size_t>(m) * stride]; }
 
   private:
-    std::vector<std::vector<DiscReal>> scatter_, waves_, analysis_;
+    std::vector<std::vector<DiscReal>> waves_, analysis_;
+    std::vector<DiscReal> even_, odd_;
 };
 
 }  // namespace medulla::sim2d

@@ -27,7 +27,7 @@ struct Collisions {
 Collisions first_collision(double sigma, double h) {
     const double half = half_chord(h), tau = 2 * sigma * half;
     // u^2 (3 - 2 u) gathers points at both ends, where d has square-root branch points.
-    static const GaussRule rule = gauss_legendre(40);
+    static const GaussRule rule = unit_gauss_rule(40);
     Collisions c;
     double sum = 0;
     for (std::size_t i = 0; i < rule.nodes.size(); ++i) {
@@ -70,7 +70,7 @@ std::vector<double> disc_single_lobe(double sigma, double g, double h, std::size
     const double pole = g == 0 ? 100 : std::min(100.0, -std::log(std::abs(g)) * 2 / width);
     const double rho = pole + std::sqrt(pole * pole + 1);
     const int count = std::clamp(static_cast<int>(std::ceil(9.2 / std::log(rho))), 2, 64);
-    const GaussRule rule = gauss_legendre(count);
+    const GaussRule rule = unit_gauss_rule(count);
     const Collisions collisions = first_collision(sigma, h);
     std::vector<double> lobe(bins);
     for (std::size_t b = 0; b < bins; ++b) {

@@ -1,5 +1,6 @@
 // Quadrature of directions for the slab. The last bin before grazing is cut dyadically: every scale of mu is resolved.
 #include "sim2d/slab_angles.hpp"
+#include "sim2d/elementary.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -24,35 +25,11 @@ double map_slope(double e) {
 /// away to 1e-10: an n-point Gauss rule errs by rho^(-2n).
 std::size_t points_for(double ratio) {
     const double rho = ratio + std::sqrt(1 + ratio * ratio);
-    const double points = std::log(1e10) / (2 * std::log(rho)) + 1;
+    const double points = portable::log(1e10) / (2 * portable::log(rho)) + 1;
     return points < kMaxPoints ? static_cast<std::size_t>(std::ceil(points)) : kMaxPoints;
 }
 
 }  // namespace
-
-GaussLegendre gauss_legendre(std::size_t n) {
-    GaussLegendre rule{std::vector<double>(n), std::vector<double>(n)};
-    for (std::size_t i = 0; i < (n + 1) / 2; ++i) {
-        double x = std::cos(kPi * (double(i) + 0.75) / (double(n) + 0.5)), slope = 1;
-        for (int iteration = 0; iteration < 100; ++iteration) {
-            double p = 1, previous = 0;
-            for (std::size_t k = 1; k <= n; ++k) {
-                const double next = ((2 * double(k) - 1) * x * p - (double(k) - 1) * previous) / double(k);
-                previous = p;
-                p = next;
-            }
-            slope = double(n) * (previous - x * p) / ((1 - x) * (1 + x));
-            const double step = p / slope;
-            x -= step;
-            if (std::abs(step) < 1e-15) break;
-        }
-        if (n % 2 == 1 && i == n / 2) x = 0;
-        rule.node[i] = -x;
-        rule.node[n - 1 - i] = x;
-        rule.weight[i] = rule.weight[n - 1 - i] = 2 / ((1 - x) * (1 + x) * slope * slope);
-    }
-    return rule;
-}
 
 SlabDirections slab_directions(std::size_t count) {
     const GaussLegendre rule = gauss_legendre(2 * count);
@@ -63,7 +40,7 @@ SlabDirections slab_directions(std::size_t count) {
         const double t = rule.node[k], e = 1 - t, u = kPi / 2 * one_minus_map(e);
         d.t.push_back(t);
         d.theta.push_back(kPi / 2 - u);
-        d.mu.push_back(std::sin(u));
+        d.mu.push_back(portable::sin(u));
         d.weight.push_back(kPi / 2 * map_slope(e) * rule.weight[k]);
         sum += d.weight.back();
         // Known for Gauss-Legendre nodes (Wang and Xiang 2012): (-1)^i sqrt((1 - t^2) w).
@@ -126,7 +103,7 @@ SlabBins slab_bins(std::size_t count, double g) {
     SlabBins bins;
     bins.count = count;
     const double w = kPi / double(count);
-    const double pole = g == 0 ? HUGE_VAL : -std::log(std::abs(g));  // distance of the phase function's poles
+    const double pole = g == 0 ? HUGE_VAL : -portable::log(std::abs(g));  // distance of the phase function's poles
     std::vector<GaussLegendre> rules;
     for (std::size_t q = 0; q <= kMaxPoints; ++q) rules.push_back(gauss_legendre(q));
     const auto add = [&](double from, double to) {  // distances from grazing
@@ -142,10 +119,10 @@ SlabBins slab_bins(std::size_t count, double g) {
             for (std::size_t k = rule.node.size(); k-- > 0;) {
                 const double u = centre + h * rule.node[k];
                 bins.theta.push_back(kPi / 2 - u);
-                bins.mu.push_back(std::sin(u));
+                bins.mu.push_back(portable::sin(u));
                 bins.weight.push_back(h * rule.weight[k]);
-                bins.sin_half.push_back(std::sin((kPi / 2 - u) / 2));
-                bins.cos_half.push_back(std::cos((kPi / 2 - u) / 2));
+                bins.sin_half.push_back(portable::sin((kPi / 2 - u) / 2));
+                bins.cos_half.push_back(portable::cos((kPi / 2 - u) / 2));
             }
         }
     };

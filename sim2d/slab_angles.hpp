@@ -5,13 +5,9 @@
 #include <cstddef>
 #include <vector>
 
-namespace medulla::sim2d {
+#include "sim2d/quadrature.hpp"
 
-/// Nodes in (-1, 1), ascending, and weights of the n-point Gauss-Legendre rule.
-struct GaussLegendre {
-    std::vector<double> node, weight;
-};
-GaussLegendre gauss_legendre(std::size_t n);
+namespace medulla::sim2d {
 
 /// The N directions theta > 0 of a 2N-point rule over (-pi/2, pi/2), from grazing (index 0) to the normal.
 struct SlabDirections {

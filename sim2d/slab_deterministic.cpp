@@ -9,6 +9,7 @@
 #include <string>
 
 #include "medulla/phase.hpp"
+#include "sim2d/elementary.hpp"
 #include "sim2d/slab_angles.hpp"
 #include "sim2d/slab_modes.hpp"
 #include "sim2d/slab_single.hpp"
@@ -28,7 +29,9 @@ constexpr double kThin = 1e-30;
 /// Directions per quarter circle. The phase function's poles lie d = -log|g| off the real axis, at the normal
 /// d / (1.167 pi / 2) in t, so the 2N-point rule errs by exp(-2.18 d N) = 1e-9 at 9.5 / d. At least 64: thin layers
 /// and the logarithms at grazing need them whatever g is.
-double directions_wanted(double g) { return g == 0 ? 64 : std::max(64.0, std::ceil(-9.5 / std::log(std::abs(g)))); }
+double directions_wanted(double g) {
+    return g == 0 ? 64 : std::max(64.0, std::ceil(-9.5 / portable::log(std::abs(g))));
+}
 
 /// The g whose bins integrate the interpolated light: twice scattered peaks have their poles at least twice as far, and
 /// no interpolant is sharper than the directions' spacing.
@@ -75,7 +78,7 @@ RawLobes single_scattering(const SlabBins& bins, double g, double depth, const s
     RawLobes raw{MatrixXd::Zero(Index(bins.count), count), MatrixXd::Zero(Index(bins.count), count)};
     for (Index i = 0; i < count; ++i) {
         const double theta = theta_i[std::size_t(i)], mu_i = slab_cosine(theta);
-        const double si = std::sin(theta / 2), ci = std::cos(theta / 2);
+        const double si = portable::sin(theta / 2), ci = portable::cos(theta / 2);
         for (const SlabBins::Group& group : bins.groups) {
             for (std::size_t r = group.first; r < group.last; ++r) {
                 const double sr = bins.sin_half[r], cr = bins.cos_half[r];
@@ -103,7 +106,7 @@ RawLobes multiple_scattering(const SlabBins& bins, const Rows& rows, const SlabO
     RawLobes raw{MatrixXd::Zero(Index(bins.count), count), MatrixXd::Zero(Index(bins.count), count)};
     Eigen::VectorXd weight(Index(bins.theta.size()));
     for (std::size_t r = 0; r < bins.theta.size(); ++r) {
-        weight(Index(r)) = bins.weight[r] * -std::expm1(-depth / bins.mu[r]) * double(bins.count) / kPi;
+        weight(Index(r)) = bins.weight[r] * -portable::expm1(-depth / bins.mu[r]) * double(bins.count) / kPi;
     }
     MatrixXd average(Index(bins.groups.size()), n);
     for (const int parity : {0, 1}) {
@@ -277,7 +280,7 @@ std::vector<std::vector<SlabSolver::Raw>> SlabSolver::raw(double sigma, const st
             for (std::size_t r = 0; r < theta_r.size(); ++r) {
                 const double mu = slab_cosine(theta_r[r]);
                 const bool mirrored = (theta_i[i] >= 0) == (theta_r[r] >= 0);  // travels towards -theta_i
-                const double scale = (mirrored && parity == 1 ? -1 : 1) * -std::expm1(-depth / mu);
+                const double scale = (mirrored && parity == 1 ? -1 : 1) * -portable::expm1(-depth / mu);
                 out[i][r].back += scale * back(Index(r), Index(i));
                 out[i][r].forward += scale * forward(Index(r), Index(i));
             }

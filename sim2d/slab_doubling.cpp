@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "medulla/phase.hpp"
+#include "sim2d/elementary.hpp"
 #include "sim2d/slab_angles.hpp"
 
 namespace medulla::sim2d {
@@ -25,12 +26,12 @@ SlabDoubling slab_doubling(double sigma, double g, std::size_t directions) {
     MatrixXd within(n, n), across(n, n);
     for (Index i = 0; i < n; ++i) {
         const double a = result.theta[std::size_t(i)];
-        mu(i) = std::cos(a);
+        mu(i) = portable::cos(a);
         weight(i) = half_pi * rule.weight[std::size_t(i)];
         for (Index j = 0; j < n; ++j) {
             const double b = result.theta[std::size_t(j)];  // travel directions b and pi - b
-            within(i, j) = planar_hg_pdf(a - b, g);
-            across(i, j) = planar_hg_pdf(a + b, -g);
+            within(i, j) = portable::planar_hg_pdf(a - b, g);
+            across(i, j) = portable::planar_hg_pdf(a + b, -g);
         }
     }
     // A layer of optical depth h, radiance averaged over its two faces (box scheme), in sum and difference of exits.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "medulla/phase.hpp"
+#include "sim2d/elementary.hpp"
 #include "sim2d/slab_single.hpp"
 
 namespace medulla::sim2d {
@@ -18,7 +19,7 @@ using Eigen::VectorXd;
 constexpr double kPi = 3.14159265358979323846;
 
 /// Scattering from inclination b to a: forward p(a - b), across p(pi - a - b). `across` as p(a + b; -g).
-double phase(double difference, double g, bool across) { return planar_hg_pdf(difference, across ? -g : g); }
+double phase(double difference, double g, bool across) { return portable::planar_hg_pdf(difference, across ? -g : g); }
 
 }  // namespace
 
@@ -135,7 +136,7 @@ Radiance exit_radiance(const SlabModes& m, double depth, const std::vector<doubl
         }
     }
     const VectorXd decay = (-depth * m.k.array()).exp(),
-                   lost = -(-depth * m.k.array()).unaryExpr([](double v) { return std::expm1(v); });
+                   lost = -(-depth * m.k.array()).unaryExpr([](double v) { return portable::expm1(v); });
     // Nothing enters: S + D = 0 at 0, S - D = 0 at depth. In x = alpha(0) + beta(depth), y = alpha(0) - beta(depth):
     MatrixXd symmetric = m.sum * (1 + decay.array()).matrix().asDiagonal();
     symmetric += m.difference * lost.asDiagonal();
@@ -149,7 +150,7 @@ Radiance exit_radiance(const SlabModes& m, double depth, const std::vector<doubl
         antisymmetric.col(0) = 2 * slope * m.sum.col(0) + 2 * m.difference.col(0);
         a_end.resize(count), b_end.resize(count);
         for (Index i = 0; i < count; ++i) {
-            const double mu = mu_i[std::size_t(i)], fed = mu > 0 ? -std::expm1(-depth / mu) : 1;
+            const double mu = mu_i[std::size_t(i)], fed = mu > 0 ? -portable::expm1(-depth / mu) : 1;
             // Integral of 1 - exp(-tau / mu) over the depth; the difference loses digits only where it is itself
             // small against depth * fed, beside which it is added.
             const double fed_twice = mu > 0 ? depth - mu * fed : depth;
@@ -202,7 +203,7 @@ SlabOrdinates::Exit SlabOrdinates::multiply_scattered(double depth, const std::v
         }
         const Radiance total = exit_radiance(modes_[parity], depth, mu_i, plus, minus);
         const Eigen::ArrayXd opaque = Eigen::Map<const Eigen::ArrayXd>(d.mu.data(), Index(n)).unaryExpr([&](double mu) {
-            return -std::expm1(-depth / mu) / mu;
+            return -portable::expm1(-depth / mu) / mu;
         });
         exit.back[parity] = opaque.inverse().matrix().asDiagonal() * (total.back - single_back);
         exit.forward[parity] = opaque.inverse().matrix().asDiagonal() * (total.forward - single_forward);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "sim2d/elementary.hpp"
 #include "tables/error.hpp"
 
 namespace medulla::tables {
@@ -130,9 +131,12 @@ Axis graded_axis(const std::string& name, const Range& range) {
     for (std::size_t i = 0; i + 1 < range.count; ++i) {
         const double u = static_cast<double>(i) / static_cast<double>(range.count - 1);
         double t = u;
-        if (name == "sigma" || name == "absorption") t = u * u;
-        if (name == "g") t = 1 - std::pow(1 - u, 1.5);
-        if (name == "h") t = std::sin(pi * u / 2);
+        // Of square roots: the same nodes on every processor.
+        const double rest = 1 - u, root = std::sqrt(rest);
+        if (name == "sigma" || name == "absorption") t = u * u * std::sqrt(u);
+        if (name == "g") t = 1 - rest * root;
+        if (name == "theta_i") t = 1 - rest * std::sqrt(root);
+        if (name == "h") t = sim2d::portable::sin(pi / 2 * (1 - rest * root));
         axis.values[i] = range.low + (range.high - range.low) * t;
     }
     axis.values.back() = range.high;

@@ -16,21 +16,26 @@ struct CompressWords {
     double max_error = 0;
     std::size_t max_bytes = 0;
     std::uint64_t seed = 1;
-    bool json = false;
+    bool nonnegative = false, json = false;
 };
 
+const char* mirror_name(Mirror mirror) {
+    return mirror == Mirror::none ? "whole" : (mirror == Mirror::even ? "even" : "odd");
+}
+
 nlohmann::ordered_json to_json(const TableReport& report) {
-    const tensor::CpReport& solve = report.solve;
-    return {{"rank", report.rank},
-            {"solver", solve.solver},
-            {"iterations", solve.iterations},
-            {"stop", tensor::to_string(solve.stop)},
-            {"seconds", solve.seconds},
-            {"relative_l2_of_factors", report.fit_error},
-            {"relative_l2_of_exit_spline", report.exit_error},
-            {"relative_l2_of_input_noise", report.noise},
-            {"least_cosine", solve.degeneracy.least_cosine},
-            {"norm_ratio", solve.degeneracy.norm_ratio}};
+    nlohmann::ordered_json json = {{"relative_l2_of_factors", report.fit_error},
+                                   {"relative_l2_of_exit_spline", report.exit_error},
+                                   {"relative_l2_of_input_noise", report.noise}};
+    for (const PartReport& part : report.parts)
+        json["parts"][mirror_name(part.mirror)] = {{"rank", part.rank},
+                                                   {"solver", part.solve.solver},
+                                                   {"iterations", part.solve.iterations},
+                                                   {"stop", tensor::to_string(part.solve.stop)},
+                                                   {"seconds", part.solve.seconds},
+                                                   {"least_cosine", part.solve.degeneracy.least_cosine},
+                                                   {"norm_ratio", part.solve.degeneracy.norm_ratio}};
+    return json;
 }
 
 /// The tables of one file, or of two that hold one kind each (on axes of their own).
@@ -59,6 +64,7 @@ void run_compress(const CompressWords& words) {
     options.rank = words.rank;
     options.seed = words.seed;
     options.solver = words.solver == "als" ? tensor::Solver::als : tensor::Solver::lm;
+    if (words.nonnegative) options.solver = tensor::Solver::nonnegative;
     if (words.max_error > 0) options.max_error = words.max_error;
     if (words.max_bytes > 0) options.max_bytes = words.max_bytes;
     std::string input;
@@ -66,22 +72,25 @@ void run_compress(const CompressWords& words) {
     const CompressResult result = compress(read_all(words.files), options, input);
     write_file(output, result.pack.data(), result.pack.size());
     if (words.json) {
-        nlohmann::ordered_json json = {{"output", output}, {"bytes", result.pack.size()}, {"seconds", result.seconds}};
-        for (const TableReport& report : result.tables) json["factors"][name_of(report.kind)] = to_json(report);
+        nlohmann::ordered_json json = {
+            {"output", output}, {"bytes", result.pack.size()}, {"seconds", result.solve_seconds}};
+        for (const TableReport& report : result.tables)
+            json["factors"][medulla::tables::name_of(report.kind)] = to_json(report);
         json["errors"] = to_json(result.errors);
         fmt::print("{}\n", json.dump());
         return;
     }
     for (const TableReport& report : result.tables) {
-        const tensor::CpReport& solve = report.solve;
-        fmt::print("{}: rank {}, {} {} iterations ({}), {:.2f} s; factors {:.3e} relative L2 (exit spline {:.1e}, ",
-                   name_of(report.kind), report.rank, solve.solver, solve.iterations, tensor::to_string(solve.stop),
-                   solve.seconds, report.fit_error, report.exit_error);
-        fmt::print("noise of the table {:.1e}); least cosine {:.3f}, norm ratio {:.1f}\n", report.noise,
-                   solve.degeneracy.least_cosine, solve.degeneracy.norm_ratio);
+        fmt::print("{}: factors {:.3e} relative L2 (exit spline {:.1e}, noise of the table {:.1e})\n",
+                   medulla::tables::name_of(report.kind), report.fit_error, report.exit_error, report.noise);
+        for (const PartReport& part : report.parts)
+            fmt::print("  {:<8} rank {:>3}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
+                       mirror_name(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
+                       tensor::to_string(part.solve.stop), part.solve.seconds, part.solve.degeneracy.least_cosine,
+                       part.solve.degeneracy.norm_ratio);
     }
     print(result.errors);
-    fmt::print("{}: {} bytes in {:.2f} s\n", output, result.pack.size(), result.seconds);
+    fmt::print("{}: {} bytes in {:.2f} s\n", output, result.pack.size(), result.solve_seconds);
 }
 
 struct DiffWords {
@@ -137,8 +146,8 @@ void add_compress(CLI::App& app, Action& action) {
                 ->expected(1, 2);
             command.add_option("-o,--output", words.output, "pack to write (default: FILE with .furpack)");
             auto* size = command.add_option_group("size")->require_option(0, 1);
-            size->add_option("--rank", words.rank, "components of each table")
-                ->check(CLI::Range(1, static_cast<int>(max_rank)))
+            size->add_option("--rank", words.rank, "components of each part: lobes have a mirror-even and an odd one")
+                ->check(CLI::Range(1, static_cast<int>(max_rank / 2)))
                 ->capture_default_str();
             size->add_option("--max-error", words.max_error, "smallest pack whose factors keep this relative L2")
                 ->check(CLI::PositiveNumber);
@@ -147,6 +156,10 @@ void add_compress(CLI::App& app, Action& action) {
             command.add_option("--solver", words.solver, "alternating least squares or Levenberg-Marquardt")
                 ->check(CLI::IsMember({"als", "lm"}))
                 ->capture_default_str();
+            command
+                .add_flag("--nonnegative", words.nonnegative,
+                          "factors >= 0: each component is a density; by coordinate descent")
+                ->excludes("--solver");
             command.add_option("--seed", words.seed, "of the solver's start")->capture_default_str();
             command.add_flag("--json", words.json, "print one JSON object");
         },

@@ -6,6 +6,7 @@
 
 #include "medulla/lookup.hpp"
 #include "tables/commands.hpp"
+#include "tables/slices.hpp"
 #include "tables/tables_file.hpp"
 
 namespace medulla::tables {
@@ -33,6 +34,8 @@ nlohmann::ordered_json info(const std::string& path) {
         const Tables tables = read_tables(path);
         json["kind"] = "tables";
         json["program"] = tables.program;
+        json["sha256"] = hex(contents_hash(tables));
+        json["configuration"] = hex(configuration_hash(tables));
         for (const Table* table : tables.present()) {
             nlohmann::ordered_json& out = json["tables"][table->name];
             out["method"] = table->method;
@@ -55,7 +58,8 @@ nlohmann::ordered_json info(const std::string& path) {
         if (!table) continue;
         const auto kind = static_cast<TableKind>(table.layout.kind);
         nlohmann::ordered_json& out = json["tables"][name_of(kind)];
-        out["rank"] = table.layout.rank;
+        out["rank"] = table.layout.even_rank + table.layout.odd_rank;
+        out["even_rank"] = table.layout.even_rank;
         for (const Axis& axis : source->parameter_axes(kind)) out["axes"].push_back(axis_json(axis));
         if (table.has_exit())
             out["exit"] = {{"name", exit_name(kind)},
@@ -100,6 +104,7 @@ void run_info(const FileWords& words) {
                 fmt::print("    {:<10} {:>5} bins as {} spline spans\n", table["exit"]["name"].get<std::string>(),
                            table["exit"]["bins"].get<std::size_t>(), table["exit"]["spans"].get<int>());
         }
+        if (tables) fmt::print("  SHA-256 of the contents: {}\n", json["sha256"].get<std::string>());
         if (!tables) fmt::print("  provenance: {}\n", json["provenance"].dump());
     }
 }
@@ -182,8 +187,8 @@ void run_verify(const FileWords& words) {
                 verify_table(*table, file);
                 cells += table->cells();
             }
-            fmt::print("{}: ok: {} cells finite and >= 0, integrals, energies and symmetry as they must be\n", file,
-                       cells);
+            fmt::print("{}: ok: SHA-256, {} cells finite and >= 0, integrals, energies and symmetry as they must be\n",
+                       file, cells);
         } else {
             const PackBalance range = verify_pack(*pack_source(read_pack(file), file), file);
             fmt::print("{}: ok: checksum, structure, lobes finite and >= 0; greatest integral error {:.1e}\n", file,

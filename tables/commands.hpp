@@ -12,6 +12,7 @@ namespace medulla::tables {
 using Action = std::function<void()>;
 
 void add_info(CLI::App& app, Action& action);
+void add_merge(CLI::App& app, Action& action);
 void add_compress(CLI::App& app, Action& action);
 void add_query(CLI::App& app, Action& action);
 void add_verify(CLI::App& app, Action& action);
@@ -20,6 +21,9 @@ void add_plot(CLI::App& app, Action& action);
 void add_export(CLI::App& app, Action& action);
 void add_bcsdf(CLI::App& app, Action& action);
 void add_presets(CLI::App& app, Action& action);
+
+/// All of them.
+void add_commands(CLI::App& app, Action& action);
 
 /// The rows of a LobeError that compress, diff and verify print alike.
 nlohmann::ordered_json to_json(const std::vector<LobeError>& errors);

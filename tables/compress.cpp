@@ -1,23 +1,31 @@
 #include "tables/compress.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "medulla/phase.hpp"
 #include "tables/error.hpp"
-#include "tables/pack_writer.hpp"
+#include "tables/parts.hpp"
 
 namespace medulla::tables {
 namespace {
 
-/// Relative L2 standard error of all lobes of one side together.
-double table_noise(const Table& table, std::size_t side) {
+constexpr int rank_step = static_cast<int>(rank_multiple), greatest_rank = static_cast<int>(max_rank);
+/// Of the slab's energies: three small axes, more rank is only rounding.
+constexpr int energy_rank = 16;
+/// Of the solves that say how hard each part is.
+constexpr int pilot_rank = 32;
+/// Room kept for the provenance text when a pack must fit into a number of bytes.
+constexpr std::size_t text_room = 2048;
+/// Errors of these tables fall about as rank^-2 (docs/accuracy.md), which is all that sharing out components needs.
+constexpr double decay = 2;
+
+/// Relative L2 standard error of all lobes of one kind together.
+double table_noise(const Table& table, TableKind kind) {
     const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
     double noise = 0, total = 0;
-    for (std::size_t cell = side; cell < table.cells(); cell += sides) {
+    for (std::size_t cell = kind == TableKind::longitudinal_forward ? 1 : 0; cell < table.cells(); cell += sides) {
         double norm = 0;
         for (std::size_t b = 0; b < table.bins(); ++b)
             norm += static_cast<double>(table.lobe_of(cell)[b]) * static_cast<double>(table.lobe_of(cell)[b]);
@@ -27,113 +35,193 @@ double table_noise(const Table& table, std::size_t side) {
     return std::sqrt(noise / total);
 }
 
-std::vector<PackedAxis> parameter_splines(const Table& table, const tensor::CpModel& model) {
-    std::vector<PackedAxis> axes;
-    for (const Axis& axis : table.axes) {
-        if (axis.name == "side" || axis_rule(axis.name).bins) continue;
-        const Quantity quantity = quantity_of(axis.name);
-        const Spline spline = Spline::through(quantity, axis.values);
-        const Eigen::MatrixXd& factor = model.factors[axes.size()];
-        axes.push_back({quantity, static_cast<std::uint32_t>(axis.size()), spline, spline.from_nodes() * factor});
+/// A part, the components it was given, and what came of them.
+struct Solve {
+    const Part* part;
+    int rank = 0;
+    tensor::CpResult result = {};
+    double error = 0;  ///< relative L2 of the kind, without the exit spline's share
+
+    /// Error expected at another rank.
+    double expected(double other) const { return error * std::pow(other / rank, -decay); }
+};
+using Solves = std::vector<Solve>;
+
+/// Decomposes every part that has a rank and no model of it. Parts are independent: the same bytes for any threads.
+void run(Solves& solves, const CompressOptions& options, bool pilot) {
+    // Dynamic scheduling takes them in order; the last kinds are the longest.
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t i = solves.size(); i > 0; --i) {
+        Solve& solve = solves[i - 1];
+        if (solve.rank < 1 || solve.result.model.rank() == solve.rank) continue;
+        tensor::CpOptions settings;
+        settings.rank = solve.rank;
+        settings.seed = options.seed;
+        if (pilot) settings.restarts = 1;
+        // The slab's energies are no densities: nothing asks their factors to be non-negative.
+        const bool signed_factors = !solve.part->lobes() && options.solver == tensor::Solver::nonnegative;
+        solve.result = tensor::cp(solve.part->values, signed_factors ? tensor::Solver::lm : options.solver, settings);
+        solve.error = solve.part->share * solve.result.report.relative_error;
     }
-    return axes;
 }
 
-std::vector<std::size_t> parameter_shape(const Table& table) {
-    std::vector<std::size_t> shape;
-    for (const Axis& axis : table.axes)
-        if (axis.name != "side" && !axis_rule(axis.name).bins) shape.push_back(axis.size());
-    return shape;
+int padded(int rank) { return static_cast<int>(padded_rank(static_cast<std::uint32_t>(rank))); }
+
+/// Components of a kind as they are stored.
+int stored_rank(const Solves& solves, TableKind kind) {
+    int sum = 0;
+    for (const Solve& solve : solves)
+        if (solve.part->kind == kind) sum += padded(solve.rank) * solve.part->copies();
+    return sum;
 }
 
-PackedTable compress_lobes(const Table& table, TableKind kind, int rank, const CompressOptions& options,
-                           TableReport& report) {
-    const std::size_t side = kind == TableKind::longitudinal_forward ? 1 : 0, bins = table.bins();
-    const std::vector<double> lobes = side_lobes(table, side);
-    const bool periodic = kind == TableKind::azimuthal;
-    const Spline exit(exit_breakpoints(exit_name(kind), bins, periodic ? options.phi_spans : options.theta_spans),
-                      periodic);
-
-    // Orthonormal coordinates of the exit spline in the space of bin averages.
-    const Eigen::MatrixXd averages = exit.bin_averages(bins);
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(averages);
-    const Eigen::Index k = exit.size(), cells = static_cast<Eigen::Index>(lobes.size() / bins);
-    const Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(averages.rows(), k);
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    const Eigen::Map<const RowMajor> values(lobes.data(), cells, static_cast<Eigen::Index>(bins));
-    tensor::Tensor reduced;
-    reduced.shape = parameter_shape(table);
-    reduced.shape.push_back(static_cast<std::size_t>(k));
-    reduced.values.resize(static_cast<std::size_t>(cells * k));
-    Eigen::Map<RowMajor>(reduced.values.data(), cells, k) = values * q;
-
-    tensor::CpOptions solve;
-    solve.rank = rank;
-    solve.seed = options.seed;
-    const tensor::CpResult result = tensor::cp(reduced, options.solver, solve);
-    const double whole = values.norm(), inside = Eigen::Map<const RowMajor>(reduced.values.data(), cells, k).norm();
-    report.kind = kind;
-    report.rank = static_cast<int>(result.model.weights.size());
-    report.exit_error = std::sqrt(std::max(0.0, (whole - inside) * (whole + inside))) / whole;
-    report.fit_error = std::hypot(report.exit_error, result.report.relative_error * inside / whole);
-    report.noise = table_noise(table, side);
-    report.solve = result.report;
-
-    PackedTable packed;
-    packed.kind = kind;
-    packed.axes = parameter_splines(table, result.model);
-    const Eigen::MatrixXd coefficients =
-        qr.matrixQR().topRows(k).triangularView<Eigen::Upper>().solve(result.model.factors.back());
-    packed.axes.push_back({quantity_of(exit_name(kind)), static_cast<std::uint32_t>(bins), exit, coefficients});
-    packed.weights = result.model.weights;
-    const auto [low, high] = std::minmax_element(lobes.begin(), lobes.end());
-    packed.low = static_cast<float>(*low), packed.high = static_cast<float>(*high);
-    return packed;
-}
-
-/// Share of the slab's energy that leaves backward. At sigma = 0 nothing leaves: its share there is the limit, taken
-/// from the parabola through the next three nodes (it multiplies an energy of 0, so only its smoothness matters).
-tensor::Tensor back_fractions(const Table& table) {
-    tensor::Tensor fraction;
-    fraction.shape = parameter_shape(table);
-    const std::vector<double>& sigma = table.axes[0].values;
-    const std::size_t row = table.cells() / 2 / sigma.size();
-    fraction.values.resize(row * sigma.size());
-    for (std::size_t i = 0; i < fraction.values.size(); ++i) {
-        const double back = table.energy[2 * i], total = back + table.energy[2 * i + 1];
-        fraction.values[i] = total > 0 ? back / total : 0.5;
+/// [first, last) of each kind's solves, which stand together.
+std::vector<std::pair<std::size_t, std::size_t>> kinds_of(const Solves& solves) {
+    std::vector<std::pair<std::size_t, std::size_t>> ranges;
+    for (std::size_t i = 0; i < solves.size(); ++i) {
+        if (i == 0 || solves[i].part->kind != solves[i - 1].part->kind) ranges.emplace_back(i, i);
+        ranges.back().second = i + 1;
     }
-    if (sigma[0] == 0 && sigma.size() >= 4)
-        for (std::size_t j = 0; j < row; ++j) {
-            double value = 0;
-            for (std::size_t a = 1; a <= 3; ++a) {
-                double lagrange = 1;
-                for (std::size_t b = 1; b <= 3; ++b)
-                    if (b != a) lagrange *= -sigma[b] / (sigma[a] - sigma[b]);
-                value += lagrange * fraction.values[a * row + j];
-            }
-            fraction.values[j] = value;
+    return ranges;
+}
+
+/// Real-valued ranks that minimise the sum of squared errors for a price of `lambda` a byte: with errors falling as
+/// rank^-decay, rank^(2 decay + 1) is proportional to error^2 / (bytes of a component).
+double share_of(const Solve& solve, double lambda) {
+    const double unit = solve.error * std::pow(solve.rank, decay);
+    return std::pow(lambda * unit * unit / static_cast<double>(solve.part->component_bytes()), 1 / (2 * decay + 1));
+}
+
+/// Greatest lambda for which fits(lambda), by bisection of its logarithm; `fits` is monotone and true for little.
+template <class Fits>
+double greatest(Fits fits) {
+    double low = -60, high = 120;
+    for (int i = 0; i < 60; ++i) {
+        const double middle = (low + high) / 2;
+        (fits(std::exp(middle)) ? low : high) = middle;
+    }
+    return std::exp(low);
+}
+
+PackedTable pack_kind(const Solves& solves, std::size_t first, std::size_t last, std::pair<float, float> range) {
+    std::vector<const Part*> parts;
+    std::vector<const tensor::CpModel*> models;
+    for (std::size_t i = first; i < last; ++i)
+        if (solves[i].rank > 0) parts.push_back(solves[i].part), models.push_back(&solves[i].result.model);
+    return join(parts, models, range);
+}
+
+/// Bytes of a pack with these ranks: laid out with factors of zeros.
+std::size_t pack_bytes(Solves solves) {
+    for (Solve& solve : solves) {
+        solve.result.model.weights = Eigen::VectorXd::Zero(solve.rank);
+        solve.result.model.factors.clear();
+        for (const std::size_t n : solve.part->values.shape)
+            solve.result.model.factors.push_back(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), solve.rank));
+    }
+    std::vector<PackedTable> tables;
+    for (const auto& [first, last] : kinds_of(solves)) tables.push_back(pack_kind(solves, first, last, {0, 0}));
+    return write_pack(tables, std::string(text_room, ' ')).size();
+}
+
+void share_bytes(Solves& solves, std::size_t bytes) {
+    const Solves pilot = solves;
+    const auto set = [&](double lambda) {
+        for (std::size_t i = 0; i < solves.size(); ++i) {
+            if (!solves[i].part->lobes()) continue;
+            const double share = share_of(pilot[i], lambda) / rank_step;
+            solves[i].rank = rank_step * std::clamp(static_cast<int>(share), 1, greatest_rank / 2 / rank_step);
         }
-    return fraction;
+    };
+    const auto fits = [&](double lambda) {
+        set(lambda);
+        return pack_bytes(solves) <= bytes;
+    };
+    if (!fits(0))
+        throw Error("--max-bytes: expected at least {} for these tables, found {}", pack_bytes(solves), bytes);
+    set(greatest(fits));
+    // What rounding down left over goes where it helps most.
+    for (;;) {
+        std::size_t best = solves.size();
+        double most = 0;
+        for (std::size_t i = 0; i < solves.size(); ++i) {
+            if (!solves[i].part->lobes() || stored_rank(solves, solves[i].part->kind) + rank_step > greatest_rank)
+                continue;
+            const double now = pilot[i].expected(solves[i].rank), then = pilot[i].expected(solves[i].rank + rank_step);
+            const double gain = (now * now - then * then) / static_cast<double>(solves[i].part->component_bytes());
+            if (gain <= most) continue;
+            solves[i].rank += rank_step;
+            if (pack_bytes(solves) <= bytes) best = i, most = gain;
+            solves[i].rank -= rank_step;
+        }
+        if (best == solves.size()) return;
+        solves[best].rank += rank_step;
+    }
 }
 
-PackedTable compress_fractions(const Table& table, int rank, const CompressOptions& options, TableReport& report) {
-    const tensor::Tensor fraction = back_fractions(table);
-    tensor::CpOptions solve;
-    solve.rank = std::min(rank, 16);  // three small axes: more rank is only rounding
-    solve.seed = options.seed;
-    const tensor::CpResult result = tensor::cp(fraction, options.solver, solve);
-    report.kind = TableKind::back_fraction;
-    report.rank = static_cast<int>(result.model.weights.size());
-    report.fit_error = result.report.relative_error;
-    report.solve = result.report;
-    PackedTable packed;
-    packed.kind = TableKind::back_fraction;
-    packed.axes = parameter_splines(table, result.model);
-    packed.weights = result.model.weights;
-    const auto [low, high] = std::minmax_element(fraction.values.begin(), fraction.values.end());
-    packed.low = static_cast<float>(*low), packed.high = static_cast<float>(*high);
-    return packed;
+double kind_error(const Solves& solves, std::size_t first, std::size_t last) {
+    double sum = 0;
+    for (std::size_t i = first; i < last; ++i)
+        sum += solves[i].error * solves[i].error + solves[i].part->exit_error * solves[i].part->exit_error;
+    return std::sqrt(sum);
+}
+
+/// Least ranks on the steps of the format that keep `error`: predicted from the last solve, solved, and predicted again
+/// until the prediction stands.
+void solve_to(Solves& solves, double error, const CompressOptions& options) {
+    for (const auto& [first, last] : kinds_of(solves)) {
+        if (!solves[first].part->lobes()) {
+            solves[first].rank = energy_rank;
+            continue;
+        }
+        double spline = 0;
+        for (std::size_t i = first; i < last; ++i) spline += solves[i].part->exit_error * solves[i].part->exit_error;
+        const double room = error * error - spline;
+        if (!(room > 0))
+            throw Error("--max-error: the exit splines of the {} leave {:.2e}, expected {:.2e}",
+                        name_of(solves[first].part->kind), std::sqrt(spline), error);
+        Solves best;
+        int least = 2 * greatest_rank, floor = 0;
+        for (int tries = 0; tries < 8; ++tries) {
+            Solves next(solves.begin() + static_cast<std::ptrdiff_t>(first),
+                        solves.begin() + static_cast<std::ptrdiff_t>(last));
+            const auto too_coarse = [&](double lambda) {
+                double sum = 0;
+                for (const Solve& solve : next) {
+                    const double e = solve.expected(std::max(1.0, share_of(solve, lambda)));
+                    sum += e * e;
+                }
+                return sum > room;
+            };
+            const double lambda = greatest(too_coarse);
+            int total = 0;
+            for (Solve& solve : next) {
+                solve.rank = rank_step * static_cast<int>(std::ceil(share_of(solve, lambda) / rank_step));
+                solve.rank = std::clamp(solve.rank, rank_step, greatest_rank - rank_step);
+                total += solve.rank;
+            }
+            // Between a total that was too small and one that was enough there is nothing left to try.
+            if (total >= least || total > greatest_rank) total = std::min(least - rank_step, greatest_rank);
+            if (total <= floor) break;
+            while (stored_rank(next, next[0].part->kind) > total)
+                std::max_element(next.begin(), next.end(), [](const Solve& a, const Solve& b) {
+                    return a.rank < b.rank;
+                })->rank -= rank_step;
+            run(next, options, false);
+            std::copy(next.begin(), next.end(), solves.begin() + static_cast<std::ptrdiff_t>(first));
+            if (kind_error(solves, first, last) <= error) {
+                least = total, best = next;
+                if (least - rank_step <= floor) break;
+            } else {
+                floor = total;
+                if (total >= greatest_rank) break;
+            }
+        }
+        if (best.empty())
+            throw Error("--max-error: {} components of the {} leave {:.2e}, expected {:.2e}", floor,
+                        name_of(solves[first].part->kind), kind_error(solves, first, last), error);
+        std::copy(best.begin(), best.end(), solves.begin() + static_cast<std::ptrdiff_t>(first));
+    }
 }
 
 std::string provenance(const Tables& tables, const CompressOptions& options, const std::string& input,
@@ -144,135 +232,69 @@ std::string provenance(const Tables& tables, const CompressOptions& options, con
     json["seed"] = options.seed;
     for (const Table* table : tables.present())
         json["tables"][table->name] = {{"method", table->method}, {"seed", table->seed}, {"paths", table->paths}};
-    for (const TableReport& report : reports)
-        json["fit"][name_of(report.kind)] = {{"rank", report.rank},
-                                             {"solver", report.solve.solver},
-                                             {"relative_l2", report.fit_error},
-                                             {"input_noise", report.noise}};
+    for (const TableReport& report : reports) {
+        nlohmann::ordered_json& fit = json["fit"][name_of(report.kind)];
+        for (const PartReport& part : report.parts) fit["ranks"].push_back(part.rank);
+        fit["solver"] = report.parts[0].solve.solver;
+        fit["relative_l2"] = report.fit_error;
+        fit["input_noise"] = report.noise;
+    }
     return json.dump();
 }
 
-}  // namespace
+std::pair<float, float> range_of(const Part& part, const Tables& tables) {
+    std::vector<double> values = part.values.values;
+    if (part.lobes())
+        values = side_lobes(part.kind == TableKind::azimuthal ? *tables.azimuthal : *tables.longitudinal,
+                            part.kind == TableKind::longitudinal_forward ? 1 : 0);
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    return {static_cast<float>(*low), static_cast<float>(*high)};
+}
 
-std::vector<double> exit_breakpoints(const std::string& exit, std::size_t bins, std::size_t spans) {
-    const double low = axis_rule(exit).low, high = axis_rule(exit).high;
-    // At least two bins to a span keeps the fit well conditioned.
-    const std::size_t n = std::clamp<std::size_t>(spans, 3, std::max<std::size_t>(3, bins / 2));
-    const auto density = [&](double x) {
-        if (exit == "phi") return 0.4 / (2 * pi) + 0.4 * planar_hg_pdf(x, 0.85) + 0.2 * planar_hg_pdf(pi - x, 0.8);
-        return 1 / pi;
-    };
-    // Cumulative density over bins, then breakpoints at its quantiles, snapped to distinct bin edges.
-    std::vector<double> cumulative(bins + 1, 0.0);
-    const double width = (high - low) / static_cast<double>(bins);
-    for (std::size_t b = 0; b < bins; ++b)
-        cumulative[b + 1] = cumulative[b] + density(low + (static_cast<double>(b) + 0.5) * width);
-    std::vector<double> points = {low};
-    std::size_t last = 0;
-    for (std::size_t i = 1; i < n; ++i) {
-        const double target = cumulative[bins] * static_cast<double>(i) / static_cast<double>(n);
-        std::size_t edge = last + 1;
-        while (edge < bins && cumulative[edge] < target) ++edge;
-        edge = std::min(edge, bins - (n - i));
-        if (edge <= last) continue;
-        points.push_back(low + static_cast<double>(edge) * width);
-        last = edge;
+TableReport report_of(const Solves& solves, std::size_t first, std::size_t last, const Tables& tables) {
+    TableReport report;
+    report.kind = solves[first].part->kind;
+    report.fit_error = kind_error(solves, first, last);
+    double spline = 0;
+    for (std::size_t i = first; i < last; ++i) {
+        report.parts.push_back({solves[i].part->mirror, solves[i].result.report, solves[i].rank});
+        spline += solves[i].part->exit_error * solves[i].part->exit_error;
     }
-    points.push_back(high);
-    return points;
+    report.exit_error = std::sqrt(spline);
+    if (solves[first].part->lobes())
+        report.noise =
+            table_noise(report.kind == TableKind::azimuthal ? *tables.azimuthal : *tables.longitudinal, report.kind);
+    return report;
 }
 
-namespace {
-
-constexpr int greatest_rank = static_cast<int>(max_rank);
-constexpr int rank_step = static_cast<int>(rank_multiple);
-/// Room kept for the provenance text when a pack must fit into a number of bytes.
-constexpr std::size_t text_room = 2048;
-
-PackedTable compress_table(const Table& table, TableKind kind, int rank, const CompressOptions& options,
-                           TableReport& report) {
-    return kind == TableKind::back_fraction ? compress_fractions(table, rank, options, report)
-                                            : compress_lobes(table, kind, rank, options, report);
-}
-
-std::vector<std::pair<TableKind, const Table*>> kinds_of(const Tables& tables) {
-    std::vector<std::pair<TableKind, const Table*>> kinds;
-    if (tables.azimuthal) kinds.emplace_back(TableKind::azimuthal, &*tables.azimuthal);
-    if (tables.longitudinal)
-        for (const TableKind kind :
-             {TableKind::longitudinal_back, TableKind::longitudinal_forward, TableKind::back_fraction})
-            kinds.emplace_back(kind, &*tables.longitudinal);
-    return kinds;
-}
-
-/// Bytes of a pack with one rank for all tables: laid out with factors of zeros.
-std::size_t pack_bytes(const Tables& tables, int rank, const CompressOptions& options) {
-    std::vector<PackedTable> empty;
-    for (const auto& [kind, table] : kinds_of(tables)) {
-        const int own = kind == TableKind::back_fraction ? std::min(rank, 16) : rank;
-        tensor::CpModel model;
-        model.weights = Eigen::VectorXd::Zero(own);
-        for (const std::size_t n : parameter_shape(*table))
-            model.factors.push_back(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), own));
-        PackedTable packed{kind, parameter_splines(*table, model), model.weights, 0, 0};
-        if (kind != TableKind::back_fraction) {
-            const bool periodic = kind == TableKind::azimuthal;
-            const Spline exit(
-                exit_breakpoints(exit_name(kind), table->bins(), periodic ? options.phi_spans : options.theta_spans),
-                periodic);
-            packed.axes.push_back({quantity_of(exit_name(kind)), static_cast<std::uint32_t>(table->bins()), exit,
-                                   Eigen::MatrixXd::Zero(exit.size(), own)});
-        }
-        empty.push_back(std::move(packed));
-    }
-    return write_pack(empty, std::string(text_room, ' ')).size();
-}
-
-int rank_within(const Tables& tables, std::size_t bytes, const CompressOptions& options) {
-    int rank = greatest_rank;
-    while (rank > rank_step && pack_bytes(tables, rank, options) > bytes) rank -= rank_step;
-    if (const std::size_t least = pack_bytes(tables, rank, options); least > bytes)
-        throw Error("--max-bytes: expected at least {} for these tables, found {}", least, bytes);
-    return rank;
-}
-
-/// Least rank on the steps of the format whose factors keep the error; bisection, since the error falls with the rank.
-PackedTable compress_to(const Table& table, TableKind kind, double error, const CompressOptions& options,
-                        TableReport& report) {
-    PackedTable best = compress_table(table, kind, greatest_rank, options, report);
-    if (report.fit_error > error)
-        throw Error("--max-error: rank {} of the {} leaves {:.2e}, expected {:.2e}", greatest_rank, name_of(kind),
-                    report.fit_error, error);
-    int low = 0, high = greatest_rank / rank_step;
-    while (high - low > 1) {
-        const int middle = (low + high) / 2;
-        TableReport tried;
-        PackedTable packed = compress_table(table, kind, middle * rank_step, options, tried);
-        if (tried.fit_error > error)
-            low = middle;
-        else
-            high = middle, best = std::move(packed), report = tried;
-    }
-    return best;
+double seconds_since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 }  // namespace
 
 CompressResult compress(const Tables& tables, const CompressOptions& options, const std::string& input) {
     const auto start = std::chrono::steady_clock::now();
+    const std::vector<Part> parts = (options.solver == tensor::Solver::nonnegative ? whole_lobes_of : parts_of)(
+        tables, options.phi_spans, options.theta_spans);
+    Solves solves;
+    const bool searched = options.max_error || options.max_bytes;
+    const int rank = searched ? pilot_rank : options.rank;
+    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank});
+    if (searched) run(solves, options, true);
+    if (options.max_error) solve_to(solves, *options.max_error, options);
+    if (options.max_bytes) share_bytes(solves, *options.max_bytes);
+    run(solves, options, false);
     CompressResult result;
     std::vector<PackedTable> packed;
-    const int rank = options.max_bytes ? rank_within(tables, *options.max_bytes, options) : options.rank;
-    for (const auto& [kind, table] : kinds_of(tables)) {
-        TableReport report;
-        const bool searched = options.max_error && kind != TableKind::back_fraction;
-        packed.push_back(searched ? compress_to(*table, kind, *options.max_error, options, report)
-                                  : compress_table(*table, kind, options.max_error ? 16 : rank, options, report));
-        result.tables.push_back(report);
+    for (const auto& [first, last] : kinds_of(solves)) {
+        packed.push_back(pack_kind(solves, first, last, range_of(*solves[first].part, tables)));
+        result.tables.push_back(report_of(solves, first, last, tables));
     }
     result.pack = write_pack(packed, provenance(tables, options, input, result.tables));
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    result.solve_seconds = seconds_since(start);
     result.errors = compare(*table_source(tables), *pack_source(result.pack, "the new pack"));
+    result.seconds = seconds_since(start);
     return result;
 }
 

@@ -14,10 +14,12 @@ using nlohmann::json;
 constexpr double radians = pi / 180;
 constexpr std::size_t greatest_file = 1 << 20;
 
-json read_json(const std::string& path) {
-    const std::vector<unsigned char> bytes = read_file(path);
-    if (bytes.size() > greatest_file)
-        throw Error("{}: expected at most {} bytes, found {}", path, greatest_file, bytes.size());
+std::string read_text(const std::string& path) {
+    const std::vector<unsigned char> bytes = read_file(path, greatest_file);
+    return {bytes.begin(), bytes.end()};
+}
+
+json parse_json(const std::string& text, const std::string& path) {
     // A hostile file could nest beyond the stack; materials need three levels.
     int depth = 0;
     const auto shallow = [&](int, json::parse_event_t event, json&) {
@@ -27,7 +29,7 @@ json read_json(const std::string& path) {
         return true;
     };
     try {
-        return json::parse(bytes.begin(), bytes.end(), shallow);
+        return json::parse(text, shallow);
     } catch (const json::exception& error) {
         throw Error("{}: expected JSON: {}", path, error.what());
     }
@@ -97,10 +99,16 @@ Material preset_material(const std::string& name, const std::string& where) {
     throw Error("{}: expected one of {}; found '{}'", where, names, name);
 }
 
-Material read_material(const std::string& path) { return material_of(read_json(path), path + ": "); }
+Material read_material(const std::string& path) { return parse_material(read_text(path), path); }
 
-std::vector<Material> read_scene(const std::string& path) {
-    const json scene = read_json(path);
+std::vector<Material> read_scene(const std::string& path) { return parse_scene(read_text(path), path); }
+
+Material parse_material(const std::string& text, const std::string& where) {
+    return material_of(parse_json(text, where), where + ": ");
+}
+
+std::vector<Material> parse_scene(const std::string& text, const std::string& path) {
+    const json scene = parse_json(text, path);
     if (!scene.is_object() || !scene.contains("materials") || !scene["materials"].is_array() ||
         scene["materials"].empty())
         throw Error("{}: /materials: expected a list of materials", path);

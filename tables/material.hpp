@@ -18,6 +18,9 @@ struct Material {
 Material read_material(const std::string& path);
 /// The materials of a scene file: {"materials": [..]}.
 std::vector<Material> read_scene(const std::string& path);
+/// The same of texts; `where` stands for the file in messages.
+Material parse_material(const std::string& text, const std::string& where);
+std::vector<Material> parse_scene(const std::string& text, const std::string& where);
 /// A row of Table 4 by name; throws Error that lists the names there are.
 Material preset_material(const std::string& name, const std::string& where);
 

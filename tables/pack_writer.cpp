@@ -30,12 +30,19 @@ class Blob {
 };
 
 PackTable write_table(Blob& blob, const PackedTable& table) {
-    const auto rank = static_cast<std::uint32_t>(table.weights.size());
-    if (rank < 1 || rank > max_rank) throw Error("pack: expected a rank from 1 to {}, found {}", max_rank, rank);
-    const std::uint32_t stride = (rank + rank_multiple - 1) / rank_multiple * rank_multiple;
+    const auto rank = static_cast<std::uint32_t>(table.weights.size()),
+               even = static_cast<std::uint32_t>(table.even_rank);
+    if (even < 1 || even > rank) throw Error("pack: expected 1 to {} even components, found {}", rank, even);
+    const std::uint32_t stride = padded_rank(even) + padded_rank(rank - even);
+    if (stride > max_rank) throw Error("pack: expected at most {} components, found {}", max_rank, stride);
+    // Where component r is stored: even ones from 0 on, odd ones from the next multiple on.
+    const auto place = [&](Eigen::Index r) {
+        return static_cast<std::size_t>(r < table.even_rank ? r : r - table.even_rank + padded_rank(even));
+    };
     PackTable layout = {};
     layout.kind = static_cast<std::uint32_t>(table.kind);
-    layout.rank = rank;
+    layout.even_rank = even;
+    layout.odd_rank = rank - even;
     layout.rank_stride = stride;
     layout.axis_count = static_cast<std::uint32_t>(table.axes.size());
     layout.low = table.low;
@@ -44,7 +51,7 @@ PackTable write_table(Blob& blob, const PackedTable& table) {
     Eigen::VectorXd integrals = Eigen::VectorXd::Zero(rank);
     for (std::size_t k = 0; k < table.axes.size(); ++k) {
         const PackedAxis& axis = table.axes[k];
-        const Eigen::MatrixXd rows = axis.spline.stored_rows(axis.coefficients);
+        const Eigen::MatrixXd& rows = axis.coefficients;
         std::vector<std::int16_t> stored(static_cast<std::size_t>(rows.rows()) * stride, 0);
         const bool exit = table.has_exit() && k + 1 == table.axes.size();
         const Eigen::VectorXd basis_integrals = axis.spline.integrals();
@@ -54,15 +61,13 @@ PackTable write_table(Blob& blob, const PackedTable& table) {
             scales[r] *= unit;
             for (Eigen::Index i = 0; i < rows.rows(); ++i) {
                 const double q = greatest > 0 ? std::nearbyint(rows(i, r) / unit) : 0;
-                stored[static_cast<std::size_t>(i) * stride + static_cast<std::size_t>(r)] =
-                    static_cast<std::int16_t>(q);
-                if (exit && i < basis_integrals.size()) integrals[r] += q * basis_integrals[i];
+                stored[static_cast<std::size_t>(i) * stride + place(r)] = static_cast<std::int16_t>(q);
+                if (exit && r < table.even_rank) integrals[r] += 2 * q * basis_integrals[i];
             }
         }
         const std::vector<Knot<float>> knots = axis.spline.float_knots();
         PackAxis& out = layout.axes[k];
         out.quantity = static_cast<std::uint32_t>(axis.quantity);
-        out.periodic = axis.spline.periodic() ? 1 : 0;
         out.nodes = axis.nodes;
         out.spans = axis.spline.spans();
         out.knots_offset = blob.append(knots.data(), knots.size());
@@ -70,7 +75,7 @@ PackTable write_table(Blob& blob, const PackedTable& table) {
     }
     const auto floats = [&](const Eigen::VectorXd& values) {
         std::vector<float> padded(stride, 0.0f);
-        for (Eigen::Index r = 0; r < rank; ++r) padded[static_cast<std::size_t>(r)] = static_cast<float>(values[r]);
+        for (Eigen::Index r = 0; r < rank; ++r) padded[place(r)] = static_cast<float>(values[r]);
         return blob.append(padded.data(), padded.size());
     };
     layout.scales_offset = floats(scales);

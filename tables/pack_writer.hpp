@@ -18,11 +18,13 @@ struct PackedAxis {
     Eigen::MatrixXd coefficients;
 };
 
-/// value = sum over r of weights[r] * product over axes of (spline of column r).
+/// value = sum over r of weights[r] * product over axes of (spline of column r). The exit axis is the half y >= 0: the
+/// first `even_rank` components are their own mirror image, the others change sign.
 struct PackedTable {
     TableKind kind;
     std::vector<PackedAxis> axes;  ///< the last one is the exit direction, but for back_fraction
     Eigen::VectorXd weights;
+    int even_rank;
     float low, high;  ///< least and greatest value of the table it was made from
 
     bool has_exit() const { return kind != TableKind::back_fraction; }

@@ -22,43 +22,87 @@ std::string line(double x1, double y1, double x2, double y2, const char* colour)
                        y1, x2, y2, colour);
 }
 
-std::string draw(const Panel& panel, double x0, double y0) {
-    double greatest = 0, low = INFINITY, high = -INFINITY;
+/// Where the numbers of a panel lie on the page.
+struct Scale {
+    double low = INFINITY, high = -INFINITY, bottom = INFINITY, top = -INFINITY;  ///< log10 where logarithmic
+    double x0, y0, w, h;
+
+    double x(double value) const { return x0 + left + w * (value - low) / (high - low); }
+    double y(double log_value) const { return y0 + ::medulla::tables::top + h * (top - log_value) / (top - bottom); }
+};
+
+Scale scale_of(const Panel& panel, double x0, double y0) {
+    Scale scale;
+    scale.x0 = x0, scale.y0 = y0, scale.w = width - left - right, scale.h = height - top - bottom;
     for (const Curve& curve : panel.curves)
         for (std::size_t i = 0; i < curve.x.size(); ++i) {
-            greatest = std::max(greatest, curve.y[i]);
-            low = std::min(low, curve.x[i]), high = std::max(high, curve.x[i]);
+            const double x = panel.log_x ? std::log10(curve.x[i]) : curve.x[i];
+            scale.low = std::min(scale.low, x), scale.high = std::max(scale.high, x);
+            if (!(curve.y[i] > 0)) continue;
+            scale.bottom = std::min(scale.bottom, std::log10(curve.y[i]));
+            scale.top = std::max(scale.top, std::log10(curve.y[i]));
         }
-    const double log_top = std::ceil(std::log10(std::max(greatest, 1e-300)) * 4) / 4, log_bottom = log_top - decades;
-    const double w = width - left - right, h = height - top - bottom;
-    const auto px = [&](double x) { return x0 + left + w * (x - low) / (high - low); };
-    const auto py = [&](double log_y) { return y0 + top + h * (log_top - log_y) / decades; };
-    std::string out = text(x0 + left + w / 2, y0 + 16, panel.title, "middle", 12);
-    for (double decade = std::ceil(log_bottom); decade <= log_top; ++decade) {
-        out += line(x0 + left, py(decade), x0 + left + w, py(decade), "#ddd");
-        out += text(x0 + left - 4, py(decade) + 4, fmt::format("{:g}", std::pow(10, decade)), "end", 10);
+    scale.top = std::ceil(scale.top * 4) / 4;
+    if (panel.log_x) {
+        scale.bottom = std::floor(scale.bottom * 4) / 4;
+        scale.low = std::floor(scale.low * 4) / 4, scale.high = std::ceil(scale.high * 4) / 4;
+    } else {
+        scale.bottom = scale.top - decades;
     }
-    const double half_turns = high > 2 ? 2 : 1;  // phi spans -180..180 degrees, theta_r -90..90
-    for (int tick = -2; tick <= 2; ++tick) {
-        const double degrees = 45 * half_turns * tick, x = px(std::clamp(degrees * M_PI / 180, low, high));
-        out += line(x, y0 + top, x, y0 + top + h, "#eee");
-        out += text(x, y0 + top + h + 14, fmt::format("{:g}", degrees), "middle", 10);
+    return scale;
+}
+
+std::string ticks(const Panel& panel, const Scale& scale) {
+    std::string out;
+    const double x0 = scale.x0 + left, y0 = scale.y0 + top;
+    for (double decade = std::ceil(scale.bottom); decade <= scale.top; ++decade) {
+        out += line(x0, scale.y(decade), x0 + scale.w, scale.y(decade), "#ddd");
+        out += text(x0 - 4, scale.y(decade) + 4, fmt::format("{:g}", std::pow(10, decade)), "end", 10);
     }
+    const auto tick = [&](double x, const std::string& label) {
+        out += line(scale.x(x), y0, scale.x(x), y0 + scale.h, "#eee");
+        out += text(scale.x(x), y0 + scale.h + 14, label, "middle", 10);
+    };
+    if (panel.log_x) {
+        for (double decade = std::ceil(scale.low); decade <= scale.high; ++decade)
+            tick(decade, fmt::format("{:g}", std::pow(10, decade)));
+        return out;
+    }
+    const double half_turns = scale.high > 2 ? 2 : 1;  // phi spans -180..180 degrees, theta_r -90..90
+    for (int i = -2; i <= 2; ++i) {
+        const double degrees = 45 * half_turns * i;
+        tick(std::clamp(degrees * M_PI / 180, scale.low, scale.high), fmt::format("{:g}", degrees));
+    }
+    return out;
+}
+
+std::string draw(const Panel& panel, double x0, double y0) {
+    const Scale scale = scale_of(panel, x0, y0);
+    const double w = scale.w, h = scale.h;
+    std::string out = text(x0 + left + w / 2, y0 + 16, panel.title, "middle", 12) + ticks(panel, scale);
+    out += text(x0 + left, y0 + top - 4, panel.y_label, "start", 10);
     out += text(x0 + left + w / 2, y0 + height - 6, panel.x_label, "middle", 10);
     out += fmt::format("<rect x='{:.1f}' y='{:.1f}' width='{:.1f}' height='{:.1f}' fill='none' stroke='#999'/>\n",
                        x0 + left, y0 + top, w, h);
-    double legend = y0 + top + h - 12 * static_cast<double>(panel.curves.size()) + 8;
+    // Errors fall from left to right, so their legend stands at the upper right; lobes leave room below.
+    double legend = panel.log_x ? y0 + top + 12 : y0 + top + h - 12 * static_cast<double>(panel.curves.size()) + 8;
     for (const Curve& curve : panel.curves) {
         out +=
             fmt::format("<polyline fill='none' stroke='{}' stroke-width='{}' {}points='", curve.colour,
                         curve.dashed ? 1.1 : 1.8, curve.dashed ? "stroke-dasharray='5 3' " : "stroke-opacity='0.55' ");
+        std::string marks;
         for (std::size_t i = 0; i < curve.x.size(); ++i) {
-            const double log_y = curve.y[i] > 0 ? std::log10(curve.y[i]) : log_bottom;
-            out += fmt::format("{:.1f},{:.1f} ", px(curve.x[i]), py(std::max(log_y, log_bottom)));
+            const double log_y = curve.y[i] > 0 ? std::log10(curve.y[i]) : scale.bottom;
+            const double x = scale.x(panel.log_x ? std::log10(curve.x[i]) : curve.x[i]);
+            const double y = scale.y(std::max(log_y, scale.bottom));
+            out += fmt::format("{:.1f},{:.1f} ", x, y);
+            if (curve.marks)
+                marks += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='2.4' fill='{}'/>\n", x, y, curve.colour);
         }
-        out += "'/>\n";
+        out += "'/>\n" + marks;
         if (curve.label.empty()) continue;
-        out += text(x0 + left + w / 2, legend, curve.label, "middle", 10, curve.colour.c_str());
+        out += panel.log_x ? text(x0 + left + w - 4, legend, curve.label, "end", 10, curve.colour.c_str())
+                           : text(x0 + left + w / 2, legend, curve.label, "middle", 10, curve.colour.c_str());
         legend += 12;
     }
     return out;

@@ -23,6 +23,9 @@ int run_program(CLI::App& app, int argc, char** argv, const std::function<void()
     } catch (const UsageError& error) {
         complain(error.what());
         return 2;
+    } catch (const Interrupted& interrupted) {
+        complain(interrupted.what());
+        return 128 + interrupted.signal;
     } catch (const std::bad_alloc&) {
         complain("not enough memory");
     } catch (const std::exception& error) {

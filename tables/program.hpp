@@ -14,7 +14,17 @@ class UsageError : public Error {
     using Error::Error;
 };
 
-/// Parses, runs and turns every error into one line on standard error. 0 done, 1 could not be done, 2 wrong words.
+/// Ended by a signal: exit status 128 + its number.
+class Interrupted : public Error {
+  public:
+    template <class... Args>
+    explicit Interrupted(int number, fmt::format_string<Args...> format, Args&&... args)
+        : Error(format, std::forward<Args>(args)...), signal(number) {}
+    const int signal;
+};
+
+/// Parses, runs and turns every error into one line on standard error. 0 done, 1 could not be done, 2 wrong words,
+/// 128 + number of a signal.
 int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& action);
 
 }  // namespace medulla::tables

@@ -8,8 +8,14 @@
 
 namespace medulla::tables {
 
-Progress::Progress(ProgressMode mode, std::string label, std::size_t total)
-    : mode_(mode), label_(std::move(label)), total_(total), start_(std::chrono::steady_clock::now()), printed_(start_) {
+Progress::Progress(ProgressMode mode, std::string label, std::size_t total, std::size_t done)
+    : mode_(mode),
+      label_(std::move(label)),
+      total_(total),
+      before_(done),
+      done_(done),
+      start_(std::chrono::steady_clock::now()),
+      printed_(start_) {
     if (mode_ == ProgressMode::automatic) mode_ = ::isatty(STDERR_FILENO) ? ProgressMode::bar : ProgressMode::plain;
 }
 
@@ -31,7 +37,7 @@ void Progress::add(std::size_t cells) {
 void Progress::print(bool last) {
     if (mode_ == ProgressMode::none || total_ == 0) return;
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-    const double rate = seconds > 0 ? static_cast<double>(done_) / seconds : 0;
+    const double rate = seconds > 0 ? static_cast<double>(done_ - before_) / seconds : 0;
     const std::string left =
         last ? fmt::format("took {}", duration_text(seconds))
              : (rate > 0 ? fmt::format("{} left", duration_text(static_cast<double>(total_ - done_) / rate)) : "");

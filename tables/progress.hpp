@@ -12,8 +12,8 @@ enum class ProgressMode { automatic, bar, plain, none };
 
 class Progress {
   public:
-    /// `automatic` is a bar on a terminal, plain lines elsewhere. `total` in cells.
-    Progress(ProgressMode mode, std::string label, std::size_t total);
+    /// `automatic` is a bar on a terminal, plain lines elsewhere. `total` in cells, `done` of them from an earlier run.
+    Progress(ProgressMode mode, std::string label, std::size_t total, std::size_t done = 0);
     ~Progress();
     void add(std::size_t cells);  ///< from any thread
 
@@ -22,7 +22,7 @@ class Progress {
 
     ProgressMode mode_;
     std::string label_;
-    std::size_t total_, done_ = 0;
+    std::size_t total_, before_, done_;
     std::chrono::steady_clock::time_point start_, printed_;
     std::mutex mutex_;
 };

@@ -2,16 +2,17 @@
 
 #include <omp.h>
 
-#include <atomic>
+#include <cmath>
 #include <cstring>
 #include <exception>
-#include <functional>
+#include <mutex>
 #include <optional>
 
 #include "sim2d/analog.hpp"
 #include "sim2d/disc_deterministic.hpp"
 #include "sim2d/slab_deterministic.hpp"
 #include "tables/error.hpp"
+#include "tables/schedule.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -34,32 +35,14 @@ std::uint64_t cell_key(std::uint64_t kind, std::initializer_list<double> paramet
 }
 
 /// Stores a solved cell. Lobes are brought to integral 1 in the float that is stored.
-void store(Table& table, std::size_t cell, const sim2d::Profile& profile) {
-    if (profile.lobe.size() != table.bins())
-        throw Error("{}: {}: the solver returned no lobe", table.name, table.describe(cell));
-    for (std::size_t b = 0; b < table.bins(); ++b)
-        table.lobe[cell * table.bins() + b] = static_cast<float>(profile.lobe[b]);
-    table.energy[cell] = profile.energy;
-    table.energy_error[cell] = profile.energy_error;
-    table.standard_error[cell] = profile.standard_error;
-    table.mean_length[cell] = profile.mean_length;
-}
-
-/// Runs `job(i)` for all i in parallel and rethrows the first error.
-void parallel(std::size_t count, int threads, const std::function<void(std::size_t)>& job) {
-    std::exception_ptr error;
-    std::atomic<bool> failed{false};
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads > 0 ? threads : omp_get_max_threads())
-    for (std::size_t i = 0; i < count; ++i) {
-        if (failed) continue;
-        try {
-            job(i);
-        } catch (...) {
-#pragma omp critical
-            if (!failed.exchange(true)) error = std::current_exception();
-        }
-    }
-    if (error) std::rethrow_exception(error);
+void store(Slice& slice, std::size_t cell, const sim2d::Profile& profile) {
+    if (profile.lobe.size() != slice.bins) throw Error("cell {}: the solver returned no lobe", cell);
+    for (std::size_t b = 0; b < slice.bins; ++b)
+        slice.lobe[cell * slice.bins + b] = static_cast<float>(profile.lobe[b]);
+    slice.energy[cell] = profile.energy;
+    slice.energy_error[cell] = profile.energy_error;
+    slice.standard_error[cell] = profile.standard_error;
+    slice.mean_length[cell] = profile.mean_length;
 }
 
 sim2d::TraceOptions trace_options(const Request& request, std::uint64_t cell) {
@@ -87,90 +70,146 @@ bool wants_paths(const Request& request, const sim2d::Profile& solved) {
 
 double worst_error(const sim2d::SlabProfile& p) { return std::max(p.back.standard_error, p.forward.standard_error); }
 
-/// What depends on g alone is worked out once and shared by every sigma; empty for the random methods.
-template <class Solver>
-std::vector<std::optional<Solver>> solvers_of(const Request& request) {
-    std::vector<std::optional<Solver>> solvers(request.g.size());
-    if (request.method == Method::automatic || request.method == Method::deterministic)
-        parallel(solvers.size(), request.threads, [&](std::size_t i) { solvers[i].emplace(request.g.values[i]); });
-    return solvers;
+bool solves(const Request& request) {
+    return request.method == Method::automatic || request.method == Method::deterministic;
 }
+
+/// What depends on g alone: made once, by the first slice that needs it, and shared by every sigma.
+template <class Solver>
+class SolversByG {
+  public:
+    explicit SolversByG(const std::vector<double>& g) : g_(g), made_(g.size()), solvers_(g.size()) {}
+
+    const Solver& at(std::size_t i) {
+        std::call_once(made_[i], [&] { solvers_[i].emplace(g_[i]); });
+        return *solvers_[i];
+    }
+
+  private:
+    const std::vector<double>& g_;
+    std::vector<std::once_flag> made_;
+    std::vector<std::optional<Solver>> solvers_;
+};
+
+/// Program, version and compiler: another compiler may round otherwise.
+std::string program_text() { return "medulla " MEDULLA_VERSION " (" MEDULLA_COMPILER ")"; }
 
 void begin(Table& table, const Request& request) {
     table.method = name_of(request.method);
     table.seed = request.seed, table.paths = request.paths;
     if (request.method == Method::deterministic) table.seed = table.paths = 0;
-    table.allocate();
-}
-
-Table simulate_azimuthal(const Request& request, ProgressMode mode) {
-    Table table;
-    table.name = "azimuthal";
-    table.axes = {request.sigma, request.g, request.h, exit_axis("phi", request.bins)};
-    begin(table, request);
-    const std::vector<double>& g = request.g.values;
-    const std::size_t offsets = request.h.size(), slices = table.cells() / offsets;
-    Progress progress(mode, "azimuthal", table.cells());
-    const auto solvers = solvers_of<sim2d::DiscSolver>(request);
-    parallel(slices, request.threads, [&](std::size_t slice) {
-        // The costly end first: great sigma.
-        slice = slices - 1 - slice;
-        const double sigma = request.sigma.values[slice / g.size()];
-        const std::size_t ig = slice % g.size();
-        std::vector<sim2d::Profile> solved(offsets);
-        if (solvers[ig]) solved = solvers[ig]->solve(sigma, request.h.values, request.bins);
-        for (std::size_t i = 0; i < offsets; ++i) {
-            const double h = request.h.values[i];
-            if (wants_paths(request, solved[i])) {
-                sim2d::Profile traced = sim2d::trace_disc(sigma, g[ig], h, request.bins,
-                                                          trace_options(request, cell_key(0, {sigma, g[ig], h})));
-                if (!solvers[ig] || traced.standard_error < solved[i].standard_error) solved[i] = std::move(traced);
-            }
-            store(table, slice * offsets + i, solved[i]);
-        }
-        progress.add(offsets);
-    });
-    return table;
-}
-
-Table simulate_longitudinal(const Request& request, ProgressMode mode) {
-    Table table;
-    table.name = "longitudinal";
-    table.axes = {request.sigma, request.g, request.theta_i, {"side", {0, 1}}, exit_axis("theta_r", request.bins / 2)};
-    begin(table, request);
-    const std::vector<double>& g = request.g.values;
-    const std::size_t angles = request.theta_i.size(), slices = table.cells() / (2 * angles);
-    Progress progress(mode, "longitudinal", table.cells());
-    const auto solvers = solvers_of<sim2d::SlabSolver>(request);
-    parallel(slices, request.threads, [&](std::size_t slice) {
-        const double sigma = request.sigma.values[slice / g.size()];
-        const std::size_t ig = slice % g.size();
-        std::vector<sim2d::SlabProfile> solved(angles);
-        if (solvers[ig]) solved = solvers[ig]->solve(sigma, request.theta_i.values, table.bins());
-        for (std::size_t i = 0; i < angles; ++i) {
-            const double theta_i = request.theta_i.values[i];
-            if (wants_paths(request, solved[i].back) || wants_paths(request, solved[i].forward)) {
-                sim2d::SlabProfile traced = sim2d::trace_slab(
-                    sigma, g[ig], theta_i, table.bins(), trace_options(request, cell_key(1, {sigma, g[ig], theta_i})));
-                if (!solvers[ig] || worst_error(traced) < worst_error(solved[i])) solved[i] = std::move(traced);
-            }
-            const std::size_t cell = 2 * (slice * angles + i);
-            store(table, cell, solved[i].back);
-            store(table, cell + 1, solved[i].forward);
-        }
-        progress.add(2 * angles);
-    });
-    return table;
 }
 
 }  // namespace
 
-Tables simulate(const Request& request, ProgressMode progress) {
+Tables plan_of(const Request& request) {
     check_request(request);
-    Tables tables;
-    tables.program = "medulla " MEDULLA_VERSION;
-    if (request.azimuthal) tables.azimuthal = simulate_azimuthal(request, progress);
-    if (request.longitudinal) tables.longitudinal = simulate_longitudinal(request, progress);
+    Tables plan;
+    plan.program = program_text();
+    if (request.azimuthal) {
+        plan.azimuthal.emplace();
+        plan.azimuthal->name = "azimuthal";
+        plan.azimuthal->axes = {request.sigma, request.g, request.h, exit_axis("phi", request.bins)};
+        begin(*plan.azimuthal, request);
+    }
+    if (request.longitudinal) {
+        plan.longitudinal.emplace();
+        plan.longitudinal->name = "longitudinal";
+        plan.longitudinal->axes = {
+            request.sigma, request.g, request.theta_i, {"side", {0, 1}}, exit_axis("theta_r", request.bins / 2)};
+        begin(*plan.longitudinal, request);
+    }
+    return plan;
+}
+
+struct SliceSolver::State {
+    explicit State(const Request& wanted)
+        : request(wanted), plan(plan_of(request)), discs(request.g.values), slabs(request.g.values) {}
+
+    const Request request;
+    const Tables plan;
+    mutable SolversByG<sim2d::DiscSolver> discs;
+    mutable SolversByG<sim2d::SlabSolver> slabs;
+
+    Slice azimuthal(double sigma, std::size_t ig) const {
+        const std::vector<double>& offsets = request.h.values;
+        const double g = request.g.values[ig];
+        Slice slice(offsets.size(), request.bins);
+        std::vector<sim2d::Profile> solved(offsets.size());
+        if (solves(request)) solved = discs.at(ig).solve(sigma, offsets, request.bins);
+        for (std::size_t i = 0; i < offsets.size(); ++i) {
+            const double h = offsets[i];
+            if (wants_paths(request, solved[i])) {
+                sim2d::Profile traced =
+                    sim2d::trace_disc(sigma, g, h, request.bins, trace_options(request, cell_key(0, {sigma, g, h})));
+                if (!solves(request) || traced.standard_error < solved[i].standard_error) solved[i] = std::move(traced);
+            }
+            store(slice, i, solved[i]);
+        }
+        return slice;
+    }
+
+    Slice longitudinal(double sigma, std::size_t ig) const {
+        const std::vector<double>& angles = request.theta_i.values;
+        const double g = request.g.values[ig];
+        Slice slice(2 * angles.size(), request.bins / 2);
+        std::vector<sim2d::SlabProfile> solved(angles.size());
+        if (solves(request)) solved = slabs.at(ig).solve(sigma, angles, slice.bins);
+        for (std::size_t i = 0; i < angles.size(); ++i) {
+            const double theta_i = angles[i];
+            if (wants_paths(request, solved[i].back) || wants_paths(request, solved[i].forward)) {
+                sim2d::SlabProfile traced = sim2d::trace_slab(sigma, g, theta_i, slice.bins,
+                                                              trace_options(request, cell_key(1, {sigma, g, theta_i})));
+                if (!solves(request) || worst_error(traced) < worst_error(solved[i])) solved[i] = std::move(traced);
+            }
+            store(slice, 2 * i, solved[i].back);
+            store(slice, 2 * i + 1, solved[i].forward);
+        }
+        return slice;
+    }
+};
+
+SliceSolver::SliceSolver(const Request& request) : state_(std::make_unique<State>(request)) {}
+SliceSolver::~SliceSolver() = default;
+
+const Tables& SliceSolver::plan() const { return state_->plan; }
+
+Slice SliceSolver::solve(const SliceId& id) const {
+    const double sigma = state_->request.sigma.values.at(id.sigma);
+    return id.table == TableName::azimuthal ? state_->azimuthal(sigma, id.g) : state_->longitudinal(sigma, id.g);
+}
+
+void in_parallel(std::size_t count, int threads, const std::atomic<bool>& stop,
+                 const std::function<void(std::size_t)>& job) {
+    std::exception_ptr error;
+    std::atomic<bool> failed{false};
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads > 0 ? threads : omp_get_max_threads())
+    for (std::size_t i = 0; i < count; ++i) {
+        if (failed || stop) continue;
+        try {
+            job(i);
+        } catch (...) {
+#pragma omp critical
+            if (!failed.exchange(true)) error = std::current_exception();
+        }
+    }
+    if (error) std::rethrow_exception(error);
+}
+
+Tables simulate(const Request& request, ProgressMode mode) {
+    const SliceSolver solver(request);
+    Tables tables = solver.plan();
+    std::size_t cells = 0;
+    for (auto* table : {&tables.azimuthal, &tables.longitudinal})
+        if (*table) (*table)->allocate(), cells += (*table)->cells();
+    const std::vector<SliceId> slices = by_cost(request, slices_of(tables));
+    Progress progress(mode, "simulate", cells);
+    const std::atomic<bool> never{false};
+    in_parallel(slices.size(), request.threads, never, [&](std::size_t i) {
+        const Slice slice = solver.solve(slices[i]);
+        put_slice(tables, slices[i], slice);
+        progress.add(slice.cells);
+    });
     return tables;
 }
 

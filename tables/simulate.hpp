@@ -1,13 +1,42 @@
-// Request -> tables: solves every (sigma, g) slice, in parallel, with the solver that the method names.
+// Request -> tables: solves (sigma, g) slices with the solver that the method names. A slice depends on the request
+// alone, not on other slices, threads or timing.
 #pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
 
 #include "tables/progress.hpp"
 #include "tables/request.hpp"
+#include "tables/slices.hpp"
 #include "tables/table.hpp"
 
 namespace medulla::tables {
 
-/// Simulates the tables of a request. The result depends on the request alone, not on threads or timing.
+/// Axes, methods, seeds of what a request asks for, its arrays not allocated. Throws Error if no solver can answer.
+Tables plan_of(const Request& request);
+
+/// Solves slices of one request. What depends on g alone is made on first use and shared. Threads may call `solve` at
+/// the same time.
+class SliceSolver {
+  public:
+    explicit SliceSolver(const Request& request);
+    ~SliceSolver();
+
+    const Tables& plan() const;
+    Slice solve(const SliceId& id) const;
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+/// Runs `job(i)` for i = 0 .. count - 1 on `threads` threads (0: all), taking no more once `stop` is set or a job has
+/// thrown; rethrows the first error.
+void in_parallel(std::size_t count, int threads, const std::atomic<bool>& stop,
+                 const std::function<void(std::size_t)>& job);
+
+/// Simulates the tables of a request in memory.
 Tables simulate(const Request& request, ProgressMode progress);
 
 }  // namespace medulla::tables

@@ -135,18 +135,24 @@ class PackSource : public Source {
         const TableView& table = pack_[kind];
         const Contraction contraction = contract(table, query(at));
         const std::uint32_t exit = table.parameter_axes(), rows = table.layout.axes[exit].spans + 3;
-        std::vector<double> coefficients(rows, 0.0);
+        const std::uint32_t stride = table.layout.rank_stride, middle = table.even_stride();
+        // Spline coefficients for y > 0 and y < 0: even part plus and minus the odd one.
+        std::vector<double> coefficients[2] = {std::vector<double>(rows), std::vector<double>(rows)};
         for (std::uint32_t j = 0; j < rows; ++j) {
             const unsigned char* row = table.row(exit, j);
-            for (std::uint32_t r = 0; r < table.layout.rank; ++r)
-                coefficients[j] += static_cast<double>(contraction.weight[r]) * detail::load<std::int16_t>(row + 2 * r);
-            coefficients[j] *= static_cast<double>(contraction.inverse_integral);
+            double part[2] = {0, 0};
+            for (std::uint32_t r = 0; r < stride; ++r)
+                part[r < middle ? 0 : 1] +=
+                    static_cast<double>(contraction.weight[r]) * detail::load<std::int16_t>(row + 2 * r);
+            const auto scale = static_cast<double>(contraction.inverse_integral);
+            coefficients[0][j] = (part[0] + part[1]) * scale, coefficients[1][j] = (part[0] - part[1]) * scale;
         }
         const std::vector<Point>& points = gauss_points(kind, bins);
         std::vector<double> out(bins, 0.0);
         for (std::size_t i = 0; i < points.size(); ++i) {
+            const std::vector<double>& c = coefficients[points[i].negative ? 1 : 0];
             double value = 0;
-            for (std::uint32_t t = 0; t < 4; ++t) value += points[i].basis[t] * coefficients[points[i].span + t];
+            for (std::uint32_t t = 0; t < 4; ++t) value += points[i].basis[t] * c[points[i].span + t];
             out[i / 3] += points[i].weight * std::max(value, 0.0);  // what medulla::lobe returns
         }
         return out;
@@ -161,6 +167,7 @@ class PackSource : public Source {
   private:
     struct Point {
         std::uint32_t span;
+        bool negative;
         double basis[4], weight;
     };
     static LobeQuery query(const Parameters& at) {
@@ -176,16 +183,15 @@ class PackSource : public Source {
         if (!points.empty()) return points;
         const TableView& table = pack_[kind];
         const AxisView<float> axis = table.axis(table.parameter_axes());
-        const double low = static_cast<double>(axis.lower()),
-                     width = (static_cast<double>(axis.upper()) - low) / static_cast<double>(bins);
+        const double high = static_cast<double>(axis.upper()), width = 2 * high / static_cast<double>(bins);
         const double node[3] = {0.5 - std::sqrt(0.15), 0.5, 0.5 + std::sqrt(0.15)},
                      weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
         for (std::size_t b = 0; b < bins; ++b)
             for (int i = 0; i < 3; ++i) {
-                const auto y = static_cast<float>(low + (static_cast<double>(b) + node[i]) * width);
-                const Cell<float> cell = locate(axis, y);
+                const auto y = static_cast<float>((static_cast<double>(b) + node[i]) * width - high);
+                const Cell<float> cell = locate(axis, std::abs(y));
                 const SplineWeights<float> w = spline_weights(axis, cell);
-                points.push_back({cell.span, {w.w[0], w.w[1], w.w[2], w.w[3]}, weight[i]});
+                points.push_back({cell.span, y < 0, {w.w[0], w.w[1], w.w[2], w.w[3]}, weight[i]});
             }
         return points;
     }

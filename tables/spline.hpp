@@ -9,20 +9,22 @@
 
 namespace medulla::tables {
 
+/// How a function continues beyond 0: not at all, f(-x) = f(x), or f(-x) = -f(x).
+enum class Mirror { none, even, odd };
+
 class Spline {
   public:
-    /// Breakpoints in the spline coordinate, increasing. A periodic axis names its first point again at the end.
-    Spline(const std::vector<double>& breakpoints, bool periodic);
+    /// Breakpoints in the spline coordinate, increasing, at least two.
+    explicit Spline(const std::vector<double>& breakpoints);
 
     /// The spline that interpolates nodes of a parameter axis (in its own unit): not-a-knot ends from four nodes on,
-    /// a parabola through three, a line through two, a constant through one.
-    static Spline through(Quantity quantity, const std::vector<double>& nodes);
+    /// a parabola through three, a line through two, a constant through one. Where the first node is 0 and the function
+    /// is even or odd there, its slope or its curvature is 0 instead (from two nodes on).
+    static Spline through(Quantity quantity, const std::vector<double>& nodes, Mirror mirror = Mirror::none);
 
     std::uint32_t spans() const { return spans_; }
-    bool periodic() const { return periodic_; }
-    /// Free coefficients: spans + 3, or spans where periodic (the stored rows repeat the first three).
-    Eigen::Index size() const { return periodic_ ? spans_ : spans_ + 3; }
-    Eigen::Index rows() const { return static_cast<Eigen::Index>(spans_) + 3; }
+    /// Coefficients, one for each stored row.
+    Eigen::Index size() const { return static_cast<Eigen::Index>(spans_) + 3; }
     AxisView<double> view() const;
     std::vector<Knot<float>> float_knots() const;
 
@@ -30,16 +32,16 @@ class Spline {
     Eigen::RowVectorXd basis(double x) const;
     /// Values at the nodes given to `through` -> coefficients.
     const Eigen::MatrixXd& from_nodes() const { return from_nodes_; }
-    /// [bins x size]: averages of the basis over `bins` equal bins of the whole axis (exact: Gauss between the knots).
-    Eigen::MatrixXd bin_averages(std::size_t bins) const;
+    /// [size x free]: coefficients of the splines that are even or odd about the first breakpoint, and about the last
+    /// one too where `both`; the columns are independent.
+    Eigen::MatrixXd mirrored(Mirror mirror, bool both) const;
+    /// [intervals x size]: averages of the basis between increasing edges (exact: Gauss between the knots).
+    Eigen::MatrixXd averages(const std::vector<double>& edges) const;
     /// Integral of each basis function over the axis.
     Eigen::VectorXd integrals() const;
-    /// Coefficients as stored rows: a periodic spline repeats its first three.
-    Eigen::MatrixXd stored_rows(const Eigen::MatrixXd& coefficients) const;
 
   private:
     std::uint32_t spans_;
-    bool periodic_;
     std::vector<Knot<double>> knots_;
     Eigen::MatrixXd from_nodes_;
 };

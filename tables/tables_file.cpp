@@ -4,6 +4,7 @@
 #include <hdf5_hl.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <functional>
@@ -11,13 +12,15 @@
 
 #include "tables/error.hpp"
 #include "tables/file.hpp"
+#include "tables/slices.hpp"
 #include "tables/zstd_filter.hpp"
 
 namespace medulla::tables {
 namespace {
 
 constexpr const char* format_name = "medulla tables";
-constexpr std::uint64_t format_version = 1;
+constexpr std::uint64_t format_version = 2, first_with_hash = 2;
+constexpr std::size_t image_step = std::size_t{1} << 24;  // bytes by which a file in memory grows
 constexpr unsigned zstd_level = 9;
 
 /// An HDF5 id that closes itself.
@@ -39,6 +42,39 @@ class Handle {
 void check(herr_t status, const std::string& what) {
     if (status < 0) throw Error("{}", what);
 }
+
+/// A file in memory as HDF5 leaves it when it closes it. (H5Fget_file_image gives one that is marked as being written.)
+struct Image {
+    unsigned char* bytes = nullptr;
+    std::size_t size = 0;
+
+    Image() = default;
+    ~Image() { std::free(bytes); }
+    Image(const Image&) = delete;
+    Image& operator=(const Image&) = delete;
+
+    void capture(hid_t access, const std::string& path) {
+        H5FD_file_image_callbacks_t callbacks = {};
+        callbacks.image_malloc = [](std::size_t n, H5FD_file_image_op_t, void*) { return std::malloc(n); };
+        callbacks.image_memcpy = [](void* to, const void* from, std::size_t n, H5FD_file_image_op_t, void*) {
+            return std::memcpy(to, from, n);
+        };
+        callbacks.image_realloc = [](void* old, std::size_t n, H5FD_file_image_op_t, void*) {
+            return std::realloc(old, n);
+        };
+        callbacks.image_free = [](void* buffer, H5FD_file_image_op_t operation, void* self) -> herr_t {
+            if (operation == H5FD_FILE_IMAGE_OP_FILE_CLOSE)
+                static_cast<Image*>(self)->bytes = static_cast<unsigned char*>(buffer);
+            else
+                std::free(buffer);
+            return 0;
+        };
+        callbacks.udata_copy = [](void* self) { return self; };
+        callbacks.udata_free = [](void*) -> herr_t { return 0; };
+        callbacks.udata = this;
+        check(H5Pset_file_image_callbacks(access, &callbacks), path + ": HDF5 has no files in memory");
+    }
+};
 
 /// HDF5's own error printing is replaced by our one line.
 void quiet() {
@@ -191,6 +227,28 @@ std::string shape_text(const std::vector<hsize_t>& shape) {
     return text;
 }
 
+/// Throws Error unless a dataset is stored as write_array stores it: chunks within the array, numbers of at most 8
+/// bytes, our filters alone. HDF5 allocates what these say before it reads.
+void check_storage(hid_t set, hid_t type, const std::vector<hsize_t>& shape, const std::string& where) {
+    const Handle properties(H5Dget_create_plist(set), H5Pclose, where + ": cannot be read");
+    std::vector<hsize_t> chunk(shape.size());
+    if (H5Tget_size(type) > 8 || H5Pget_layout(properties) != H5D_CHUNKED ||
+        H5Pget_chunk(properties, static_cast<int>(chunk.size()), chunk.data()) != static_cast<int>(chunk.size()))
+        throw Error("{}: expected an array in chunks", where);
+    for (std::size_t k = 0; k < chunk.size(); ++k)
+        if (chunk[k] < 1 || chunk[k] > shape[k])
+            throw Error("{}: expected chunks within shape {}, found {}", where, shape_text(shape), shape_text(chunk));
+    const int filters = H5Pget_nfilters(properties);
+    for (int i = 0; i < filters; ++i) {
+        unsigned flags = 0, config = 0;
+        std::size_t count = 0;
+        const H5Z_filter_t id =
+            H5Pget_filter2(properties, static_cast<unsigned>(i), &flags, &count, nullptr, 0, nullptr, &config);
+        if (id != H5Z_FILTER_SHUFFLE && id != H5Z_FILTER_DEFLATE && id != H5Z_FILTER_FLETCHER32 && id != zstd_filter_id)
+            throw Error("{}: expected shuffle, gzip, zstd and Fletcher-32 filters, found filter {}", where, id);
+    }
+}
+
 template <class T>
 std::vector<T> read_array(hid_t group, const std::string& name, hid_t memory, const std::vector<hsize_t>& expected,
                           const std::string& where, bool may_be_infinite = false) {
@@ -208,6 +266,7 @@ std::vector<T> read_array(hid_t group, const std::string& name, hid_t memory, co
         throw Error("{}/{}: expected shape {}, found {}", where, name, shape_text(expected), shape_text(shape));
     if (expected.empty() && (rank != 1 || shape[0] < 1 || shape[0] > 4096))
         throw Error("{}/{}: expected 1 to 4096 values, found shape {}", where, name, shape_text(shape));
+    check_storage(set, type, shape, fmt::format("{}/{}", where, name));
     std::size_t count = 1;
     for (const hsize_t n : shape) count *= n;
     // What a file declares it must also hold: a damaged one cannot make us allocate beyond 1000 times its size.
@@ -260,22 +319,33 @@ Table read_table(hid_t file, const std::string& name, const std::string& path) {
 
 }  // namespace
 
-void write_tables(const std::string& path, const Tables& tables, Compression compression) {
+void write_tables(const std::string& path, const Tables& tables, Compression compression,
+                  const std::string& temporary) {
     quiet();
     register_zstd_filter();
-    PendingFile pending(path);
+    // The file is made in memory and written by us: HDF5 closes a file on a full disk without a word.
+    PendingFile pending(path, temporary);
+    Image image;
     {
         const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, path + ": HDF5 gives no property list");
         check(H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110), path + ": HDF5 1.10 or later is needed");
+        check(H5Pset_fapl_core(access, image_step, false), path + ": HDF5 has no files in memory");
+        image.capture(access, path);
         const Handle create = untracked(H5P_FILE_CREATE, path);
         const Handle file(H5Fcreate(pending.temporary().c_str(), H5F_ACC_TRUNC, create, access), H5Fclose,
                           path + ": cannot be written");
         write_attribute(file, "format", format_name, path);
         write_attribute(file, "format_version", format_version, path);
         write_attribute(file, "program", tables.program, path);
+        write_attribute(file, "configuration", hex(configuration_hash(tables)), path);
+        write_attribute(file, "sha256", hex(contents_hash(tables)), path);
         for (const Table* table : tables.present()) write_table(file, *table, compression, path);
         check(H5Fflush(file, H5F_SCOPE_LOCAL), path + ": cannot be written");
+        const ssize_t size = H5Fget_file_image(file, nullptr, 0);
+        image.size = size > 0 ? static_cast<std::size_t>(size) : 0;
     }
+    if (!image.bytes || image.size == 0) throw Error("{}: HDF5 gives no file", path);
+    pending.write(image.bytes, image.size);
     pending.commit();
 }
 
@@ -296,13 +366,18 @@ Tables read_tables(const std::string& path) {
     const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, path + ": damaged HDF5 file");
     if (read_text(file, "format", path) != format_name)
         throw Error("{}: expected format '{}', found '{}'", path, format_name, read_text(file, "format", path));
-    if (const std::uint64_t version = read_whole(file, "format_version", path); version != format_version)
-        throw Error("{}: expected format version {}, found {}", path, format_version, version);
+    const std::uint64_t version = read_whole(file, "format_version", path);
+    if (version < 1 || version > format_version)
+        throw Error("{}: expected format version 1 to {}, found {}", path, format_version, version);
     Tables tables;
     tables.program = read_text(file, "program", path);
     if (H5Lexists(file, "azimuthal", H5P_DEFAULT) > 0) tables.azimuthal = read_table(file, "azimuthal", path);
     if (H5Lexists(file, "longitudinal", H5P_DEFAULT) > 0) tables.longitudinal = read_table(file, "longitudinal", path);
     if (tables.present().empty()) throw Error("{}: expected /azimuthal or /longitudinal, found neither", path);
+    if (version >= first_with_hash) {
+        const std::string expected = read_text(file, "sha256", path), found = hex(contents_hash(tables));
+        if (expected != found) throw Error("{}: expected contents of SHA-256 {}, found {}", path, expected, found);
+    }
     return tables;
 }
 

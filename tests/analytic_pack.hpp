@@ -28,7 +28,7 @@ struct AxisSpec {
 
 struct TableSpec {
     TableKind kind;
-    int rank;
+    int rank, even;  ///< all components, and how many of them, the first, are even in the exit direction
     std::vector<AxisSpec> axes;
 };
 
@@ -60,12 +60,10 @@ inline std::vector<double> solve(std::vector<std::vector<double>> a, std::vector
     return b;
 }
 
-/// Knots with two ghosts at either end: mirrored, or repeated where the axis is periodic.
-inline std::vector<double> with_ghosts(const std::vector<double>& t, bool periodic) {
+/// Knots with two mirrored ghosts at either end.
+inline std::vector<double> with_ghosts(const std::vector<double>& t) {
     const int n = int(t.size()) - 1;
-    const double turn = t[n] - t[0];
     const auto at = [&](int i) {
-        if (periodic) return i < 0 ? t[i + n] - turn : (i > n ? t[i - n] + turn : t[i]);
         return i < 0 ? 2 * t[0] - t[std::min(-i, n)] - (-i > n ? 1.0 : 0.0)
                      : (i > n ? 2 * t[n] - t[std::max(2 * n - i, 0)] + (i > 2 * n ? 1.0 : 0.0) : t[i]);
     };
@@ -84,27 +82,23 @@ std::vector<Knot<T>> packed_knots(const std::vector<double>& t) {
     return knots;
 }
 
-/// Coefficients of the spline through f at the breakpoints (and the middle of the first and last span, where open).
-inline std::vector<double> interpolate(const std::vector<double>& t, bool periodic,
-                                       const std::function<double(double)>& f) {
-    const auto knots = packed_knots<double>(with_ghosts(t, periodic));
+/// Coefficients of the spline through f at the breakpoints and the middle of the first and last span.
+inline std::vector<double> interpolate(const std::vector<double>& t, const std::function<double(double)>& f) {
+    const auto knots = packed_knots<double>(with_ghosts(t));
     const auto spans = std::uint32_t(t.size() - 1);
-    const AxisView<double> axis = {reinterpret_cast<const unsigned char*>(knots.data()), spans, false};
+    const AxisView<double> axis = {reinterpret_cast<const unsigned char*>(knots.data()), spans};
     std::vector<double> sites(t.begin(), t.end());
-    if (periodic) sites.pop_back();
-    if (!periodic) sites.push_back((t[0] + t[1]) / 2), sites.push_back((t[spans - 1] + t[spans]) / 2);
-    if (!periodic && spans == 1) sites.back() = t[0] + 0.75 * (t[1] - t[0]);
+    sites.push_back((t[0] + t[1]) / 2), sites.push_back((t[spans - 1] + t[spans]) / 2);
+    if (spans == 1) sites.back() = t[0] + 0.75 * (t[1] - t[0]);
     std::vector<std::vector<double>> a(sites.size(), std::vector<double>(sites.size(), 0.0));
     std::vector<double> b;
     for (std::size_t i = 0; i < sites.size(); ++i) {
         const auto cell = locate(axis, sites[i]);
         const auto w = spline_weights(axis, cell);
-        for (std::size_t k = 0; k < 4; ++k) a[i][(cell.span + k) % sites.size()] += w.w[k];
+        for (std::size_t k = 0; k < 4; ++k) a[i][cell.span + k] = w.w[k];
         b.push_back(f(sites[i]));
     }
-    std::vector<double> c = solve(a, b);
-    for (std::uint32_t k = 0; periodic && k < 3; ++k) c.push_back(c[k]);
-    return c;
+    return solve(a, b);
 }
 
 class PackBuilder {
@@ -123,32 +117,34 @@ class PackBuilder {
         for (const TableSpec& spec : specs_) {
             PackTable table = {};
             table.kind = std::uint32_t(spec.kind);
-            table.rank = std::uint32_t(spec.rank);
-            table.rank_stride = (table.rank + rank_multiple - 1) / rank_multiple * rank_multiple;
+            table.even_rank = std::uint32_t(spec.even), table.odd_rank = std::uint32_t(spec.rank - spec.even);
+            table.rank_stride = padded_rank(table.even_rank) + padded_rank(table.odd_rank);
+            const auto place = [&](int r) {
+                return std::size_t(r < spec.even ? r : r - spec.even + int(padded_rank(table.even_rank)));
+            };
             table.axis_count = std::uint32_t(spec.axes.size());
             std::vector<float> scales(table.rank_stride, 0.0f), integrals(table.rank_stride, 0.0f);
-            for (int r = 0; r < spec.rank; ++r) scales[std::size_t(r)] = 1;
+            for (int r = 0; r < spec.rank; ++r) scales[place(r)] = 1;
             for (std::size_t k = 0; k < spec.axes.size(); ++k) {
                 const AxisSpec& axis = spec.axes[k];
-                const bool periodic = axis.quantity == Quantity::phi;
                 const auto spans = std::uint32_t(axis.breakpoints.size() - 1);
-                const auto knots = packed_knots<float>(with_ghosts(axis.breakpoints, periodic));
+                const auto knots = packed_knots<float>(with_ghosts(axis.breakpoints));
                 std::vector<std::int16_t> rows(std::size_t(spans + 3) * table.rank_stride, 0);
                 for (int r = 0; r < spec.rank; ++r) {
-                    const auto c = interpolate(axis.breakpoints, periodic, [&](double x) { return axis.factor(r, x); });
+                    const auto c = interpolate(axis.breakpoints, [&](double x) { return axis.factor(r, x); });
                     double most = 0;
                     for (double x : c) most = std::max(most, std::abs(x));
                     const double unit = most > 0 ? most / 32767 : 1;
                     for (std::size_t j = 0; j < c.size(); ++j)
-                        rows[j * table.rank_stride + std::size_t(r)] = std::int16_t(std::lround(c[j] / unit));
-                    scales[std::size_t(r)] *= float(unit);
+                        rows[j * table.rank_stride + place(r)] = std::int16_t(std::lround(c[j] / unit));
+                    scales[place(r)] *= float(unit);
                 }
                 table.axes[k].quantity = std::uint32_t(axis.quantity);
-                table.axes[k].periodic = periodic;
                 table.axes[k].nodes = table.axes[k].spans = spans;
                 table.axes[k].knots_offset = put(knots.data(), knots.size() * sizeof knots[0]);
                 table.axes[k].rows_offset = put(rows.data(), rows.size() * 2);
-                if (k + 1 == spec.axes.size()) integrals = exit_integrals(knots, rows, spans, table.rank_stride);
+                if (k + 1 == spec.axes.size())
+                    integrals = exit_integrals(knots, rows, spans, table.rank_stride, padded_rank(table.even_rank));
             }
             table.scales_offset = put(scales.data(), scales.size() * 4);
             if (spec.kind != TableKind::back_fraction)
@@ -171,19 +167,20 @@ class PackBuilder {
     }
 
   private:
-    /// Two Gauss nodes per span integrate a cubic exactly.
+    /// Over both halves of the axis: twice the stored one's for even components, 0 for odd ones. Two Gauss nodes per
+    /// span integrate a cubic exactly.
     static std::vector<float> exit_integrals(const std::vector<Knot<float>>& knots,
                                              const std::vector<std::int16_t>& rows, std::uint32_t spans,
-                                             std::uint32_t stride) {
+                                             std::uint32_t stride, std::uint32_t even) {
         std::vector<double> sum(stride, 0.0);
-        const AxisView<float> axis = {reinterpret_cast<const unsigned char*>(knots.data()), spans, false};
+        const AxisView<float> axis = {reinterpret_cast<const unsigned char*>(knots.data()), spans};
         for (std::uint32_t i = 0; i < spans; ++i) {
             const double a = axis.knot(int(i)).t, b = axis.knot(int(i) + 1).t;
             for (double x : {-0.57735026918962576, 0.57735026918962576}) {
                 const auto w = spline_weights(axis, Cell<float>{i, float((a + b) / 2 + x * (b - a) / 2)});
                 for (std::uint32_t k = 0; k < 4; ++k)
-                    for (std::uint32_t r = 0; r < stride; ++r)
-                        sum[r] += (b - a) / 2 * double(w.w[k]) * rows[(i + k) * stride + r];
+                    for (std::uint32_t r = 0; r < even; ++r)
+                        sum[r] += (b - a) * double(w.w[k]) * rows[(i + k) * stride + r];
             }
         }
         return std::vector<float>(sum.begin(), sum.end());
@@ -200,15 +197,15 @@ inline double azimuthal_density(double sigma, double g, double h, double phi, in
 }
 
 inline TableSpec azimuthal_table(int harmonics = 15, int phi_spans = 48) {
-    TableSpec spec = {TableKind::azimuthal, harmonics + 1, {}};
+    TableSpec spec = {TableKind::azimuthal, harmonics + 1, harmonics, {}};
     const int last = harmonics;
     spec.axes.push_back(
-        {Quantity::sigma, even(0, 16, 12), [=](int r, double x) { return r == last ? 1 : std::exp(-0.1 * x * r); }});
+        {Quantity::sigma, even(0, 4, 24), [=](int r, double c) { return r == last ? 1 : std::exp(-0.1 * c * c * r); }});
     spec.axes.push_back(
         {Quantity::g, even(-0.95, 0.95, 24), [=](int r, double x) { return r == last ? x * x - 1 : std::pow(x, r); }});
     spec.axes.push_back(
         {Quantity::h, even(0, 1, 8), [=](int r, double c) { return r == last ? 2 * c / (1 + c * c) : 1.0; }});
-    spec.axes.push_back({Quantity::phi, even(-pi, pi, phi_spans), [=](int r, double x) {
+    spec.axes.push_back({Quantity::phi, even(0, pi, phi_spans / 2), [=](int r, double x) {
                              return r == last ? 0.4 * std::sin(x) / (2 * pi) : (r ? 2 : 1) * std::cos(r * x) / (2 * pi);
                          }});
     return spec;
@@ -221,13 +218,14 @@ inline double longitudinal_density(bool back, double g, double theta_i, double t
 }
 
 inline TableSpec longitudinal_table(bool back, int rank = 2) {
-    TableSpec spec = {back ? TableKind::longitudinal_back : TableKind::longitudinal_forward, rank, {}};
-    spec.axes.push_back({Quantity::sigma, even(0, 16, 12), [](int, double) { return 1.0; }});
+    TableSpec spec = {back ? TableKind::longitudinal_back : TableKind::longitudinal_forward, rank, 1, {}};
+    spec.axes.push_back({Quantity::sigma, even(0, 4, 12), [](int, double) { return 1.0; }});
     spec.axes.push_back({Quantity::g, even(-0.95, 0.95, 24),
                          [=](int r, double x) { return r == 1 ? (back ? -0.3 : -0.9 * x - 0.05) : 1.0; }});
-    spec.axes.push_back(
-        {Quantity::theta_i, even(0, pi / 2, 12), [](int r, double x) { return r == 1 ? std::sin(x) : 1.0; }});
-    spec.axes.push_back({Quantity::theta_r, even(-pi / 2, pi / 2, 24),
+    spec.axes.push_back({Quantity::theta_i, even(0, 1, 12), [](int r, double c) {
+                             return r == 1 ? std::sin(from_spline_coordinate(Quantity::theta_i, c)) : 1.0;
+                         }});
+    spec.axes.push_back({Quantity::theta_r, even(0, pi / 2, 12),
                          [](int r, double x) { return r > 1 ? 0.0 : std::cos(x) / 2 * (r == 1 ? std::sin(x) : 1.0); }});
     return spec;
 }

@@ -10,8 +10,8 @@
 using namespace medulla;
 using namespace medulla::tables;
 
-TEST_CASE("locate and position are each other's inverse; ends are held, periods wrap", "[axis]") {
-    const Spline open({0, 0.1, 0.5, 2, 3.5}, false), wrapped({-1, 0, 0.5, 2, 3}, true);
+TEST_CASE("locate and position are each other's inverse; ends are held", "[axis]") {
+    const Spline open({0, 0.1, 0.5, 2, 3.5});
     for (double x = 0; x <= 3.5; x += 0.01) {
         const Cell<double> cell = locate(open.view(), x);
         CHECK(position(cell) == x);
@@ -20,30 +20,26 @@ TEST_CASE("locate and position are each other's inverse; ends are held, periods 
     }
     CHECK(locate(open.view(), -7.0).x == 0);
     CHECK((locate(open.view(), 9.0).x == 3.5 && locate(open.view(), 9.0).span == 3));
-    CHECK(locate(wrapped.view(), 3.25).x == Approx(-0.75));
-    CHECK(locate(wrapped.view(), -1.5).x == Approx(2.5));
     CHECK(std::isnan(locate(open.view(), std::nan("")).x));
 }
 
 TEST_CASE("Spline weights are non-negative and sum to 1", "[axis]") {
-    for (const bool periodic : {false, true}) {
-        const Spline spline({0, 0.1, 0.5, 2, 3.5}, periodic);
-        for (double x = 0; x <= 3.5; x += 0.007) {
-            const SplineWeights<double> w = spline_weights(spline.view(), locate(spline.view(), x));
-            double sum = 0;
-            for (const double v : w.w) {
-                CHECK(v >= -1e-16);
-                sum += v;
-            }
-            CHECK(sum == Approx(1).epsilon(1e-14));
+    const Spline spline({0, 0.1, 0.5, 2, 3.5});
+    for (double x = 0; x <= 3.5; x += 0.007) {
+        const SplineWeights<double> w = spline_weights(spline.view(), locate(spline.view(), x));
+        double sum = 0;
+        for (const double v : w.w) {
+            CHECK(v >= -1e-16);
+            sum += v;
         }
+        CHECK(sum == Approx(1).epsilon(1e-14));
     }
 }
 
 TEST_CASE("A spline through nodes reproduces its nodes, and polynomials of its degree", "[axis]") {
     for (const std::vector<double>& nodes :
          {std::vector<double>{0.3}, {0, 1}, {0, 0.2, 1}, {0, 0.1, 0.4, 1}, {0, 0.1, 0.4, 1, 2, 2.5}}) {
-        const Spline spline = Spline::through(Quantity::sigma, nodes);
+        const Spline spline = Spline::through(Quantity::g, nodes);
         const int degree = std::min<int>(3, static_cast<int>(nodes.size()) - 1);
         Eigen::VectorXd values(static_cast<Eigen::Index>(nodes.size()));
         const auto f = [&](double x) { return std::pow(x - 0.7, degree) + 1; };
@@ -55,10 +51,48 @@ TEST_CASE("A spline through nodes reproduces its nodes, and polynomials of its d
     }
 }
 
+TEST_CASE("Mirrored splines are even or odd about their ends, and reach every such cubic spline", "[axis]") {
+    const Spline spline({0, 0.1, 0.5, 1.2, 2});
+    for (const Mirror mirror : {Mirror::even, Mirror::odd})
+        for (const bool both : {false, true}) {
+            const Eigen::MatrixXd free = spline.mirrored(mirror, both);
+            // A cubic spline has two derivatives: one condition at an even end, two at an odd one.
+            CHECK(free.cols() == spline.size() - (mirror == Mirror::even ? 1 : 2) * (both ? 2 : 1));
+            const Eigen::VectorXd c = free * Eigen::VectorXd::LinSpaced(free.cols(), 1, -2);
+            const auto f = [&](double x) { return spline.basis(x).dot(c); };
+            for (const double end : both ? std::vector<double>{0, 2} : std::vector<double>{0}) {
+                const double inward = end == 0 ? 1 : -1, step = 1e-3;
+                const double f0 = f(end), f1 = f(end + inward * step), f2 = f(end + inward * 2 * step),
+                             f3 = f(end + inward * 3 * step);
+                // Exact for cubics up to rounding, 1e-16 / step^2; knots are rounded to float, 6e-8 of a slope.
+                if (mirror == Mirror::even)
+                    CHECK((-11 * f0 + 18 * f1 - 9 * f2 + 2 * f3) / (6 * step) == Approx(0).margin(1e-5));
+                if (mirror == Mirror::odd) CHECK(f0 == Approx(0).margin(1e-6));
+                if (mirror == Mirror::odd)
+                    CHECK((2 * f0 - 5 * f1 + 4 * f2 - f3) / (step * step) == Approx(0).margin(1e-4));
+            }
+        }
+}
+
+TEST_CASE("A spline through nodes of an even or odd function is even or odd", "[axis]") {
+    for (const std::vector<double>& nodes : {std::vector<double>{0, 1}, {0, 0.4, 1}, {0, 0.2, 0.5, 0.8, 1}}) {
+        for (const Mirror mirror : {Mirror::even, Mirror::odd}) {
+            const Spline spline = Spline::through(Quantity::g, nodes, mirror);
+            Eigen::VectorXd values(static_cast<Eigen::Index>(nodes.size()));
+            const auto f = [&](double x) { return mirror == Mirror::even ? 2 - 0.7 * x * x : 1.3 * x; };
+            for (std::size_t i = 0; i < nodes.size(); ++i) values[static_cast<Eigen::Index>(i)] = f(nodes[i]);
+            const Eigen::VectorXd c = spline.from_nodes() * values;
+            for (double x = 0; x <= 1; x += 0.05) CHECK(spline.basis(x).dot(c) == Approx(f(x)).margin(1e-6));
+        }
+    }
+}
+
 TEST_CASE("Bin averages of a spline are its exact averages", "[axis]") {
-    const Spline spline({-3, -1, -0.5, 0.25, 1, 3}, true);
+    const Spline spline({-3, -1, -0.5, 0.25, 1, 3});
     const Eigen::VectorXd c = Eigen::VectorXd::LinSpaced(spline.size(), 1, 2);
-    const Eigen::VectorXd averages = spline.bin_averages(12) * c;
+    std::vector<double> edges;
+    for (int b = 0; b <= 12; ++b) edges.push_back(-3 + 0.5 * b);
+    const Eigen::VectorXd averages = spline.averages(edges) * c;
     for (int b = 0; b < 12; ++b) {
         double sum = 0;
         const int n = 2000;
@@ -74,6 +108,16 @@ TEST_CASE("The spline coordinate of h is tan(asin(h) / 2) to the last digits at 
         CHECK(c == Approx(std::tan(std::asin(h) / 2)).epsilon(1e-8));  // asin loses half its digits at 1
         CHECK(from_spline_coordinate(Quantity::h, c) == Approx(h).epsilon(1e-15));
     }
+}
+
+TEST_CASE("Every spline coordinate has its inverse, and holds where rounding leaves the axis", "[axis]") {
+    for (const Quantity q : {Quantity::sigma, Quantity::g, Quantity::h, Quantity::theta_i})
+        for (const double x : {0.0, 1e-12, 0.25, 0.999, 1.0}) {
+            CHECK(from_spline_coordinate(q, spline_coordinate(q, x)) == Approx(x).epsilon(1e-14));
+            if (x > 0) CHECK(spline_coordinate(q, x) > spline_coordinate(q, 0.9 * x));
+        }
+    CHECK(spline_coordinate(Quantity::theta_i, float(pi / 2)) >= 0.999999f);  // float(pi/2) lies above pi/2
+    CHECK(spline_coordinate(Quantity::theta_i, 1.6f) > 1);                    // beyond the end, whose value holds
 }
 
 TEST_CASE("Ranges: what is read and what is refused", "[axis]") {

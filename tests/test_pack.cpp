@@ -11,29 +11,43 @@ using namespace medulla::tables;
 
 namespace {
 
-/// Rank-2 lobes: (1 + sigma g) cos-like bump + (2 - h) constant, exactly representable but for rounding.
+/// The exit axis of the small pack.
+Spline small_exit() {
+    std::vector<double> breakpoints;
+    for (int i = 0; i <= 8; ++i) breakpoints.push_back(pi * i / 8);
+    return Spline(breakpoints);
+}
+/// Coefficients of its even bump and constant, and of its odd wave.
+Eigen::VectorXd small_column(int r) {
+    const Spline exit = small_exit();
+    Eigen::VectorXd c(exit.size());
+    for (Eigen::Index j = 0; j < exit.size(); ++j)
+        c[j] =
+            r == 0 ? 1.5 + std::cos(static_cast<double>(j)) : (r == 1 ? 1.0 : 0.1 * std::sin(static_cast<double>(j)));
+    return c;
+}
+
+/// Rank-3 lobes: (1 + sigma)(1 - g) bump + (1 + g) constant + h wave, exactly representable but for rounding.
 std::vector<unsigned char> small_pack() {
     const std::vector<double> sigma = {0, 1, 2, 4}, g = {0, 0.5}, h = {0, 0.3, 1};
-    PackedTable table{TableKind::azimuthal, {}, Eigen::VectorXd::Ones(2), 0, 1};
-    const auto parameter = [&](Quantity q, const std::vector<double>& nodes, auto f0, auto f1) {
+    PackedTable table{TableKind::azimuthal, {}, Eigen::VectorXd::Ones(3), 2, 0, 1};
+    const auto parameter = [&](Quantity q, const std::vector<double>& nodes, auto f0, auto f1, auto f2) {
         const Spline spline = Spline::through(q, nodes);
-        Eigen::MatrixXd values(static_cast<Eigen::Index>(nodes.size()), 2);
+        Eigen::MatrixXd values(static_cast<Eigen::Index>(nodes.size()), 3);
         for (std::size_t i = 0; i < nodes.size(); ++i)
-            values.row(static_cast<Eigen::Index>(i)) << f0(nodes[i]), f1(nodes[i]);
+            values.row(static_cast<Eigen::Index>(i)) << f0(nodes[i]), f1(nodes[i]), f2(nodes[i]);
         table.axes.push_back({q, static_cast<std::uint32_t>(nodes.size()), spline, spline.from_nodes() * values});
     };
+    const auto one = [](double) { return 1.0; };
     parameter(
-        Quantity::sigma, sigma, [](double x) { return 1 + x; }, [](double) { return 2.0; });
+        Quantity::sigma, sigma, [](double x) { return 1 + x; }, [](double) { return 2.0; }, one);
     parameter(
-        Quantity::g, g, [](double x) { return 1 - x; }, [](double x) { return 1 + x; });
+        Quantity::g, g, [](double x) { return 1 - x; }, [](double x) { return 1 + x; }, one);
     parameter(
-        Quantity::h, h, [](double) { return 1.0; }, [](double) { return 0.5; });
-    std::vector<double> breakpoints;
-    for (int i = 0; i <= 8; ++i) breakpoints.push_back(-pi + 2 * pi * i / 8);
-    const Spline exit(breakpoints, true);
-    Eigen::MatrixXd coefficients(exit.size(), 2);
-    for (Eigen::Index j = 0; j < exit.size(); ++j) coefficients.row(j) << 1.5 + std::cos(static_cast<double>(j)), 1.0;
-    table.axes.push_back({Quantity::phi, 36, exit, coefficients});
+        Quantity::h, h, one, [](double) { return 0.5; }, [](double x) { return x; });
+    Eigen::MatrixXd coefficients(small_exit().size(), 3);
+    for (int r = 0; r < 3; ++r) coefficients.col(r) = small_column(r);
+    table.axes.push_back({Quantity::phi, 36, small_exit(), coefficients});
     return write_pack({table}, "{\"made\":\"test\"}");
 }
 
@@ -58,29 +72,32 @@ TEST_CASE("A pack's lobes are the factors' lobes, and integrate to 1", "[pack]")
     REQUIRE(table);
     CHECK_FALSE(opened.pack[TableKind::longitudinal_back]);
     CHECK(std::string(opened.pack.text, opened.pack.text_bytes) == "{\"made\":\"test\"}");
-    std::vector<double> breakpoints;
-    for (int i = 0; i <= 8; ++i) breakpoints.push_back(-pi + 2 * pi * i / 8);
-    const Spline exit(breakpoints, true);
+    const Spline exit = small_exit();
+    const double steps = 2000, h = 0.3;
     for (const float sigma : {0.0f, 0.7f, 4.0f})
         for (const float g : {0.0f, 0.2f, 0.5f}) {
             LobeQuery query;
-            query.sigma = sigma, query.g = g, query.h = 0.4f;
+            query.sigma = sigma, query.g = g, query.h = float(h);
             const Contraction contraction = contract(table, query);
-            Eigen::VectorXd c(exit.size());
-            for (Eigen::Index j = 0; j < exit.size(); ++j)
-                c[j] = (1 + double(sigma)) * (1 - double(g)) * (1.5 + std::cos(static_cast<double>(j))) +
-                       2 * (1 + double(g)) * 0.5;
-            c /= exit.integrals().dot(c);
+            Eigen::VectorXd even =
+                (1 + double(sigma)) * (1 - double(g)) * small_column(0) + 2 * (1 + double(g)) * 0.5 * small_column(1);
+            const double whole = 2 * exit.integrals().dot(even);
             double integral = 0;
-            for (int i = 0; i < 1000; ++i) {
-                const double phi = -pi + 2 * pi * (i + 0.5) / 1000;
+            for (int i = 0; i < steps; ++i) {
+                const double phi = -pi + 2 * pi * (i + 0.5) / steps, side = phi < 0 ? -1 : 1;
                 const double value = lobe(table, contraction, static_cast<float>(phi));
-                CHECK(value == Approx(exit.basis(phi).dot(c)).epsilon(1e-4));  // int16: 2^-16 per axis, four axes
-                integral += value * 2 * pi / 1000;
+                const double expected = exit.basis(std::abs(phi)).dot(even + side * h * small_column(2)) / whole;
+                CHECK(value == Approx(expected).epsilon(1e-4));  // int16: 2^-16 per axis, four axes
+                integral += value * 2 * pi / steps;
+                CHECK(lobe(table, contraction, static_cast<float>(phi + 4 * pi)) == Approx(value).epsilon(1e-4));
             }
-            CHECK(integral == Approx(1).epsilon(2e-6));  // float sums of the contraction
-            // h < 0 is the mirror image.
+            CHECK(integral == Approx(1).epsilon(2e-6));  // float sums; midpoint rule, (2 pi / 2000)^2 / 24 of a slope
+            // h < 0 is the mirror image; h = 0 is its own, to the last bit.
             CHECK(azimuthal(opened.pack, sigma, g, -0.4f, 1.0f) == azimuthal(opened.pack, sigma, g, 0.4f, -1.0f));
+            query.h = 0;
+            const Contraction central = contract(table, query);
+            const float there = lobe(table, central, 1.0f);
+            CHECK(std::abs(lobe(table, central, -1.0f) - there) <= 1e-6f * there);  // float: the odd factor is h's 0
         }
     CHECK(azimuthal(opened.pack, 0, 0.2f, 0.1f, 0.3f) == 0);
     CHECK(std::isnan(longitudinal(opened.pack, Side::back, 1, 0.2f, 0.1f, 0.3f)));  // no such table
@@ -105,7 +122,8 @@ TEST_CASE("Each defect of a pack is refused with its own status", "[pack]") {
     CHECK(status_after([](auto& b) { poke(b, offsetof(PackHeader, version), 99u); }) == PackStatus::other_version);
     CHECK(status_after([](auto& b) { b.insert(b.end(), 16, 0); }) == PackStatus::wrong_size);
     CHECK(status_after([](auto& b) { poke(b, sizeof(PackHeader), 0x5a5a5a5au); }, false) == PackStatus::wrong_checksum);
-    CHECK(status_after([&](auto& b) { poke(b, table + offsetof(PackTable, rank), 1000u); }) == PackStatus::bad_table);
+    CHECK(status_after([&](auto& b) { poke(b, table + offsetof(PackTable, even_rank), 1000u); }) ==
+          PackStatus::bad_table);
     CHECK(status_after([&](auto& b) { poke(b, table + offsetof(PackTable, kind), 7u); }) == PackStatus::bad_table);
     CHECK(status_after([&](auto& b) { poke(b, axis + offsetof(PackAxis, quantity), 6u); }) == PackStatus::bad_axis);
     CHECK(status_after([&](auto& b) { poke(b, axis + offsetof(PackAxis, rows_offset), 0xfffffff0u); }) ==

@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "tables/compress.hpp"
 #include "tables/error.hpp"
 #include "tables/file.hpp"
 #include "tables/simulate.hpp"
+#include "tables/source.hpp"
 #include "tables/tables_file.hpp"
 
 using namespace medulla;
@@ -120,26 +120,6 @@ TEST_CASE("A damaged tables file is refused, never read as something else", "[ta
     CHECK_THROWS_AS(read_tables(broken), Error);
     write_file(broken, std::string("not a table"));
     CHECK_THROWS_AS(read_tables(broken), Error);
-}
-
-TEST_CASE("A pack of a table is the table within the error it reports", "[tables]") {
-    Request request = small_request(Method::automatic);
-    const Tables tables = simulate(request, ProgressMode::none);
-    CompressOptions options;
-    options.rank = 12;
-    const CompressResult result = compress(tables, options, "test");
-    const std::vector<LobeError> errors = compare(*table_source(tables), *pack_source(result.pack, "test"));
-    REQUIRE(errors.size() == 3);
-    REQUIRE(result.tables.size() == 4);
-    for (std::size_t i = 0; i < 3; ++i) {
-        CHECK(errors[i].relative == result.errors[i].relative);
-        CHECK(errors[i].relative < 0.1);
-        CHECK(errors[i].least >= 0);
-        // Normalisation and rounding move the factors' own error only a little.
-        CHECK(errors[i].relative < 1.5 * result.tables[i].fit_error + 1e-3);
-    }
-    const CompressResult again = compress(tables, options, "test");
-    CHECK(again.pack == result.pack);
 }
 
 TEST_CASE("Off its nodes a table is asked through the same splines as a pack", "[tables]") {

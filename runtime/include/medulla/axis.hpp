@@ -17,23 +17,31 @@ enum class Quantity : std::uint32_t {
     absorption = 2,  ///< optical radius of absorption [1], >= 0
     h = 3,           ///< offset in the medulla's cross-section [medulla radii], in [0, 1]
     theta_i = 4,     ///< inclination of the direction towards the light [radians], in [0, pi/2]
-    phi = 5,         ///< azimuth of exit [radians], periodic, 0 = forward
-    theta_r = 6,     ///< inclination of exit [radians], in [-pi/2, pi/2]
+    phi = 5,      ///< azimuth of exit [radians], 0 = forward; axes run over [0, pi], the other half is its mirror image
+    theta_r = 6,  ///< inclination of exit [radians]; axes run over [0, pi/2], the other half is its mirror image
 };
 inline constexpr std::uint32_t quantity_count = 7;
 
-/// The variable in which lobes are smooth, and in which splines run: the quantity itself, but for offsets
-/// tan(asin(h) / 2) = h / (1 + sqrt(1 - h^2)), since lobes have the square-root behaviour of the chord at h = 1.
+/// The variable in which lobes are smooth, and in which splines run: the quantity itself, but for
+/// - optical radii, sqrt(sigma): near grazing exits lobes change with sigma / cos theta_r, over every scale of sigma;
+/// - offsets, tan(asin(h) / 2) = h / (1 + sqrt(1 - h^2)), since lobes have the square-root behaviour of the chord;
+/// - inclinations, the same of u = theta_i / (pi/2), since near grazing lobes change as (1 - u) log(1 - u).
 template <class T>
 MEDULLA_FN T spline_coordinate(Quantity quantity, T x) noexcept {
-    if (quantity != Quantity::h) return x;
-    return x / (T(1) + std::sqrt((T(1) - x) * (T(1) + x)));
+    if (quantity == Quantity::sigma || quantity == Quantity::absorption) return std::sqrt(x);
+    if (quantity != Quantity::h && quantity != Quantity::theta_i) return x;
+    const T u = quantity == Quantity::h ? x : x * T(2 / pi);
+    const T below = T(1) - u;  // below 0 by the rounding of pi/2, or outside the axis, whose end holds there
+    return u / (T(1) + std::sqrt((below < T(0) ? T(0) : below) * (T(1) + u)));
 }
 
 /// Inverse of spline_coordinate.
 template <class T>
 MEDULLA_FN T from_spline_coordinate(Quantity quantity, T c) noexcept {
-    return quantity != Quantity::h ? c : T(2) * c / (T(1) + c * c);
+    if (quantity == Quantity::sigma || quantity == Quantity::absorption) return c * c;
+    if (quantity != Quantity::h && quantity != Quantity::theta_i) return c;
+    const T u = T(2) * c / (T(1) + c * c);
+    return quantity == Quantity::h ? u : u * T(pi / 2);
 }
 
 /// A breakpoint and the reciprocals that the de Boor recurrence divides by.
@@ -45,7 +53,7 @@ struct Knot {
     T inverse3;  ///< 1 / (t[i+3] - t[i])
 };
 
-/// Ghost breakpoints on either side of the axis; they mirror it, or repeat it where it is periodic.
+/// Ghost breakpoints on either side of the axis; they mirror it.
 inline constexpr std::uint32_t ghost_knots = 2;
 
 /// Breakpoints t[0] < ... < t[spans], spans >= 1, with ghosts: spans + 1 + 2 * ghost_knots knots, unaligned.
@@ -53,7 +61,6 @@ template <class T>
 struct AxisView {
     const unsigned char* knots;
     std::uint32_t spans;
-    bool periodic;
 
     /// Breakpoint i, -2 <= i <= spans + 2.
     MEDULLA_FN Knot<T> knot(std::int32_t i) const noexcept {
@@ -80,12 +87,11 @@ struct Cell {
     T x;
 };
 
-/// The cell of `x` (a spline coordinate): wrapped on a periodic axis, else held to the axis's ends. A NaN stays NaN in
-/// `x` and takes span 0, so that it is seen in the result.
+/// The cell of `x` (a spline coordinate), held to the axis's ends. A NaN stays NaN in `x` and takes span 0, so that it
+/// is seen in the result.
 template <class T>
 MEDULLA_HOT Cell<T> locate(const AxisView<T>& axis, T x) noexcept {
     const T lower = axis.lower(), upper = axis.upper();
-    if (axis.periodic && !(x >= lower && x <= upper)) x -= std::floor((x - lower) / (upper - lower)) * (upper - lower);
     x = x < lower ? lower : (x > upper ? upper : x);
     // Even breakpoints are where they would be expected; else a binary search, whose steps are masks and no branches.
     const T even = (x - lower) / (upper - lower) * T(axis.spans);
@@ -122,7 +128,6 @@ MEDULLA_FN AxisIndex<T> index_axis(const AxisView<T>& axis) noexcept {
 template <class T>
 MEDULLA_HOT Cell<T> locate(const AxisView<T>& axis, const AxisIndex<T>& index, T x) noexcept {
     const T lower = index.lower, upper = index.upper;
-    if (axis.periodic && !(x >= lower && x <= upper)) x -= std::floor((x - lower) / (upper - lower)) * (upper - lower);
     x = x < lower ? lower : (x > upper ? upper : x);
     const T stretch = (x - lower) * index.scale;
     const std::int32_t i = stretch > T(0) ? std::int32_t(stretch) : 0;

@@ -9,7 +9,7 @@
 
 namespace medulla {
 
-inline constexpr int most_bins = 128;
+inline constexpr int most_bins = 128;  ///< over the full axis, both halves
 
 /// Piecewise linear density over an exit axis, integral 1. `value` is the lobe held to `floor_share` of the even
 /// density and more, so that the lobe between two knots never meets a density of 0.
@@ -57,31 +57,40 @@ struct ExitDistribution {
 /// Share of an even density below which no value is held.
 inline constexpr float floor_share = 0.02f;
 
-/// Reads the contracted lobe at its knots (every few knots where there are more than most_bins spans).
+/// Reads the contracted lobe at its knots (every few knots where there are more than most_bins spans on both halves).
 MEDULLA_FN void distribute(const TableView& table, const Contraction& contraction, ExitDistribution& out) noexcept {
     const std::uint32_t k = table.parameter_axes();
     const AxisView<float> axis = table.axis(k);
-    const std::uint32_t stride = (axis.spans + most_bins - 1) / most_bins;
-    out.bins = int((axis.spans + stride - 1) / stride);
-    out.periodic = axis.periodic;
-    const float floor_value = floor_share / (axis.upper() - axis.lower());
+    const std::uint32_t stride = (2 * axis.spans + most_bins - 1) / most_bins;
+    const int half = int((axis.spans + stride - 1) / stride);
+    out.bins = 2 * half;
+    out.periodic = static_cast<Quantity>(table.layout.axes[k].quantity) == Quantity::phi;
+    const float floor_value = floor_share / (2 * axis.upper());
     // The spline at a knot is the blend of three coefficients; each is a dot product with one row.
-    float c[3] = {};
-    std::uint32_t known = 0;  // c holds rows known - 3 .. known - 1
+    float even[3] = {}, odd[3] = {};
+    std::uint32_t known = 0;  // they hold rows known - 3 .. known - 1
     const auto next_row = [&]() {
-        c[0] = c[1], c[1] = c[2];
-        c[2] = detail::row_sum(table, k, known++, contraction.weight) * contraction.inverse_integral;
+        even[0] = even[1], even[1] = even[2], odd[0] = odd[1], odd[1] = odd[2];
+        const std::uint32_t middle = table.even_stride(), end = table.layout.rank_stride;
+        even[2] = detail::row_sum(table, k, known, contraction.weight, 0, middle) * contraction.inverse_integral;
+        odd[2] = detail::row_sum(table, k, known++, contraction.weight, middle, end) * contraction.inverse_integral;
     };
-    for (int i = 0; i <= out.bins; ++i) {
+    const auto put = [&](int i, float y, float value) {
+        out.edge[i] = y;
+        out.value[i] = value > floor_value ? value : floor_value;
+    };
+    for (int i = 0; i <= half; ++i) {
         const std::uint32_t at = std::uint32_t(i) * stride < axis.spans ? std::uint32_t(i) * stride : axis.spans;
         while (known < at + 3) next_row();
         // At the last knot the blend runs from the last span, at its right end: weights w[1..3] there.
         const bool last = at == axis.spans;
-        const auto w = spline_weights(axis, Cell<float>{last ? at - 1 : at, axis.knot(std::int32_t(at)).t});
+        const float y = axis.knot(std::int32_t(at)).t;
+        const auto w = spline_weights(axis, Cell<float>{last ? at - 1 : at, y});
         const float* v = last ? w.w + 1 : w.w;
-        const float value = v[0] * c[0] + v[1] * c[1] + v[2] * c[2];
-        out.edge[i] = axis.knot(std::int32_t(at)).t;
-        out.value[i] = value > floor_value ? value : floor_value;
+        const float e = v[0] * even[0] + v[1] * even[1] + v[2] * even[2];
+        const float o = v[0] * odd[0] + v[1] * odd[1] + v[2] * odd[2];
+        put(half + i, y, e + o);
+        if (i > 0) put(half - i, -y, e - o);
     }
     float total = 0;
     out.cumulative[0] = 0;

@@ -62,8 +62,8 @@ MEDULLA_HOT AxisPoint sigma_point(const MaterialTable& table, float sigma) noexc
 MEDULLA_HOT AxisPoint last_point(const MaterialTable& table, float x) noexcept {
     return axis_point(table.view, table.last_axis, table.last_index, x);
 }
-MEDULLA_HOT AxisPoint exit_point(const MaterialTable& table, float y) noexcept {
-    return axis_point(table.view, table.view.parameter_axes(), table.exit_index, y);
+MEDULLA_HOT ExitPoint exit_point(const MaterialTable& table, float y) noexcept {
+    return exit_point(table.view, table.exit_index, y);
 }
 /// Density of the contracted lobe at y, >= 0, as lobe() of lookup.hpp.
 MEDULLA_FN float lobe(const MaterialTable& table, const Contraction& contraction, float y) noexcept {
@@ -205,8 +205,8 @@ MEDULLA_FN void longitudinal_lobes(const FurFibre<Channels>& fibre, const Longit
     const float side = m.theta_i < 0 ? -theta_r : theta_r;
     const float t = std::abs(wrap_angle(phi)) * float(1 / pi);
     const TableView &back_view = fibre.back.view, &forward_view = fibre.forward.view;
-    const AxisPoint at_back = exit_point(fibre.back, side);
-    const AxisPoint at_forward = fibre.paired ? at_back : exit_point(fibre.forward, side);
+    const ExitPoint at_back = exit_point(fibre.back, side);
+    const ExitPoint at_forward = fibre.paired ? at_back : exit_point(fibre.forward, side);
     const float back = signed_lobe(back_view, m.back, at_back);
     const float forward = signed_lobe(forward_view, m.forward, at_forward);
     lobes.M[3] = lobes.M[4] = (1 - t) * (back < 0 ? 0.0f : back) + t * (forward < 0 ? 0.0f : forward);

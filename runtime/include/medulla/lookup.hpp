@@ -1,5 +1,6 @@
 // Lobes straight from the factors: contract the parameter axes once, then read any number of exit directions.
-// value(x_1 .. x_d, y) = sum over r of scale_r * prod over k of f_kr(x_k) * u_r(y), f and u cubic splines.
+// value(x_1 .. x_d, y) = sum over r of scale_r * prod over k of f_kr(x_k) * u_r(y), f and u cubic splines. Lobes at h =
+// 0 and theta_i = 0 are their own mirror images: components are even or odd in y, and only y >= 0 is stored.
 #pragma once
 
 #include <cmath>
@@ -136,11 +137,12 @@ MEDULLA_HOT Eight load_eight(const TableView& table, std::uint32_t offset, std::
     return load_eight(x);
 }
 
-/// sum over r of weight[r] * (row `row` of axis k)[r].
-MEDULLA_FN float row_sum(const TableView& table, std::uint32_t k, std::uint32_t row, const float* weight) noexcept {
+/// sum over r in [from, to) of weight[r] * (row `row` of axis k)[r].
+MEDULLA_FN float row_sum(const TableView& table, std::uint32_t k, std::uint32_t row, const float* weight,
+                         std::uint32_t from, std::uint32_t to) noexcept {
     const unsigned char* bytes = table.row(k, row);
     Eight sum = zero_eight();
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple)
+    for (std::uint32_t first = from; first < to; first += rank_multiple)
         sum = plus(sum, times(load_eight(weight + first), convert_eight(bytes + 2 * first)));
     return sum_of(sum);
 }
@@ -188,11 +190,34 @@ MEDULLA_FN void contract_axis(const TableView& table, std::uint32_t k, float x, 
     contract_axis(table, k, axis_point(table, k, x), from, to);
 }
 
+/// Where an exit direction lies: on the stored half of the axis, and the sign of the odd components there.
+struct ExitPoint {
+    AxisPoint at;
+    float sign;  ///< 1 for y >= 0, -1 below; NaN for a NaN
+};
+
+/// y in [-pi, pi] for an azimuth (any number of turns is taken off), else y itself.
+MEDULLA_HOT float wrapped_exit(const TableView& table, float y) noexcept {
+    if (table.layout.axes[table.parameter_axes()].quantity != static_cast<std::uint32_t>(Quantity::phi)) return y;
+    if (y >= -float(pi) && y <= float(pi)) return y;
+    return y - std::floor((y + float(pi)) * float(0.5 / pi)) * float(2 * pi);
+}
+
+/// @param y exit direction [radians]; an inclination outside [-pi/2, pi/2] is held to the end
+MEDULLA_HOT ExitPoint exit_point(const TableView& table, float y) noexcept {
+    const float x = wrapped_exit(table, y);
+    return {axis_point(table, table.parameter_axes(), x < 0 ? -x : x), x < 0 ? -1.0f : 1.0f};
+}
+MEDULLA_HOT ExitPoint exit_point(const TableView& table, const AxisIndex<float>& index, float y) noexcept {
+    const float x = wrapped_exit(table, y);
+    return {axis_point(table, table.parameter_axes(), index, x < 0 ? -x : x), x < 0 ? -1.0f : 1.0f};
+}
+
 /// 1 / integral over the exit direction of the contracted lobe. A signed low-rank sum with no positive integral is no
 /// density; it has no light to give and 0 is returned.
 MEDULLA_FN float inverse_integral(const TableView& table, const float* weight) noexcept {
     detail::Eight sum = detail::zero_eight();
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple)
+    for (std::uint32_t first = 0; first < table.even_stride(); first += rank_multiple)  // odd ones have no integral
         sum = detail::plus(sum, detail::times(detail::load_eight(weight + first),
                                               detail::load_eight(table, table.layout.integrals_offset, first)));
     const float total = detail::sum_of(sum);
@@ -211,19 +236,23 @@ MEDULLA_FN Contraction contract(const TableView& table, const LobeQuery& query) 
     return result;
 }
 
-/// Density per radian at a point of the exit axis, before anything is held to >= 0.
-MEDULLA_HOT float signed_lobe(const TableView& table, const Contraction& contraction, const AxisPoint& at) noexcept {
-    const unsigned char* row = table.row(table.parameter_axes(), at.span);
-    const std::uint32_t stride = table.layout.rank_stride;
-    detail::Eight sum = detail::zero_eight();
-    for (std::uint32_t first = 0; first < stride; first += rank_multiple)
-        sum = detail::plus(sum, detail::times(detail::load_eight(contraction.weight + first),
-                                              detail::blend(row + 2 * first, 2 * std::size_t(stride), at.weights)));
-    return detail::sum_of(sum) * contraction.inverse_integral;
+/// Density per radian at an exit direction, before anything is held to >= 0.
+MEDULLA_HOT float signed_lobe(const TableView& table, const Contraction& contraction, const ExitPoint& to) noexcept {
+    const unsigned char* row = table.row(table.parameter_axes(), to.at.span);
+    const std::uint32_t stride = table.layout.rank_stride, even = table.even_stride();
+    detail::Eight sum[2] = {detail::zero_eight(), detail::zero_eight()};
+    const auto add = [&](detail::Eight& part, std::uint32_t first) {
+        part =
+            detail::plus(part, detail::times(detail::load_eight(contraction.weight + first),
+                                             detail::blend(row + 2 * first, 2 * std::size_t(stride), to.at.weights)));
+    };
+    for (std::uint32_t first = 0; first < even; first += rank_multiple) add(sum[0], first);
+    for (std::uint32_t first = even; first < stride; first += rank_multiple) add(sum[1], first);
+    return detail::sum_of(detail::plus(sum[0], detail::times(to.sign, sum[1]))) * contraction.inverse_integral;
 }
 /// The same at exit direction y [radians] of a table with an exit axis.
 MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contraction, float y) noexcept {
-    return signed_lobe(table, contraction, axis_point(table, table.parameter_axes(), y));
+    return signed_lobe(table, contraction, exit_point(table, y));
 }
 
 /// Density per radian, >= 0, with integral 1: a signed low-rank sum dips below 0 where the lobe is nearly 0, and

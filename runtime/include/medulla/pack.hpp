@@ -12,11 +12,15 @@
 namespace medulla {
 
 inline constexpr char pack_magic[8] = {'F', 'U', 'R', 'P', 'A', 'C', 'K', '\n'};
-inline constexpr std::uint32_t pack_version = 1;
-inline constexpr std::uint32_t max_rank = 160;
+inline constexpr std::uint32_t pack_version = 2;
+inline constexpr std::uint32_t max_rank = 256;
 inline constexpr std::uint32_t max_axes = 6;
 inline constexpr std::uint32_t max_spans = 4096;
 inline constexpr std::uint32_t rank_multiple = 8;  ///< rows are padded with zeros to a multiple of this rank
+
+MEDULLA_FN constexpr std::uint32_t padded_rank(std::uint32_t rank) noexcept {
+    return (rank + rank_multiple - 1) / rank_multiple * rank_multiple;
+}
 
 /// The tables a pack can hold. The numbers are part of the format.
 enum class TableKind : std::uint32_t {
@@ -42,19 +46,19 @@ static_assert(sizeof(PackHeader) == 64 && offsetof(PackHeader, checksum) == 24);
 
 struct PackAxis {
     std::uint32_t quantity;      ///< a Quantity
-    std::uint32_t periodic;      ///< 0 or 1
     std::uint32_t nodes;         ///< nodes (or bins) of the table it was made from, for information
     std::uint32_t spans;         ///< of the spline
     std::uint32_t knots_offset;  ///< Knot<float>[spans + 5]
     std::uint32_t rows_offset;   ///< int16[spans + 3][rank_stride]: spline coefficients, one row per coefficient
-    std::uint32_t reserved[2];   ///< 0
+    std::uint32_t reserved[3];   ///< 0
 };
 static_assert(sizeof(PackAxis) == 32);
 
 struct PackTable {
     std::uint32_t kind;           ///< a TableKind, each at most once
-    std::uint32_t rank;           ///< 1 .. max_rank
-    std::uint32_t rank_stride;    ///< rank rounded up to rank_multiple
+    std::uint32_t even_rank;      ///< components that are their own mirror image in the exit direction, >= 1
+    std::uint32_t odd_rank;       ///< components that change sign there; 0 without an exit axis
+    std::uint32_t rank_stride;    ///< each of the two rounded up to rank_multiple, and added: 8 .. max_rank
     std::uint32_t axis_count;     ///< 1 .. max_axes; the last one is the exit direction, where there is one
     std::uint32_t scales_offset;  ///< float[rank_stride]: weight of one unit of int16 in every axis
     std::uint32_t
@@ -62,7 +66,7 @@ struct PackTable {
     float low, high;       ///< least and greatest value of the table it was made from
     PackAxis axes[max_axes];
 };
-static_assert(sizeof(PackTable) == 224);
+static_assert(sizeof(PackTable) == 228);
 
 /// 64-bit FNV-1a with the header's checksum field read as zeros. Any change of one byte changes it.
 MEDULLA_FN std::uint64_t pack_checksum(const unsigned char* bytes, std::size_t count) noexcept {
@@ -82,8 +86,10 @@ struct TableView {
 
     MEDULLA_FN explicit operator bool() const noexcept { return bytes != nullptr; }
     MEDULLA_FN AxisView<float> axis(std::uint32_t k) const noexcept {
-        return {bytes + layout.axes[k].knots_offset, layout.axes[k].spans, layout.axes[k].periodic != 0};
+        return {bytes + layout.axes[k].knots_offset, layout.axes[k].spans};
     }
+    /// Components [0, even_stride) are mirror-even, [even_stride, rank_stride) mirror-odd.
+    MEDULLA_FN std::uint32_t even_stride() const noexcept { return padded_rank(layout.even_rank); }
     /// Row `row` of axis k: int16[rank_stride].
     MEDULLA_FN const unsigned char* row(std::uint32_t k, std::uint32_t row_index) const noexcept {
         return bytes + layout.axes[k].rows_offset + std::size_t(row_index) * layout.rank_stride * 2;
@@ -139,7 +145,7 @@ inline const char* describe(PackStatus status) noexcept {
         case PackStatus::bad_axis:
             return "a table's axes are not those of its kind";
         case PackStatus::bad_knots:
-            return "an axis's knots do not increase";
+            return "an axis's knots do not increase, or do not span its range";
         case PackStatus::bad_number:
             return "a scale or integral is not finite";
         case PackStatus::out_of_bounds:
@@ -183,9 +189,7 @@ MEDULLA_FN bool axes_fit(const PackTable& table) noexcept {
     }
     if (table.axis_count != n) return false;
     for (std::uint32_t k = 0; k < n; ++k) {
-        const bool periodic = expected[k] == Quantity::phi;
         if (table.axes[k].quantity != static_cast<std::uint32_t>(expected[k])) return false;
-        if (table.axes[k].periodic != (periodic ? 1u : 0u)) return false;
         if (table.axes[k].spans < 1 || table.axes[k].spans > max_spans) return false;
     }
     return (table.integrals_offset != 0) == (kind != TableKind::back_fraction);
@@ -208,11 +212,20 @@ MEDULLA_FN PackStatus check_knots(const AxisView<float>& axis) noexcept {
     return PackStatus::ok;
 }
 
+/// Exit axes run from 0 to the end of the half that is stored.
+MEDULLA_FN bool half_circle(const AxisView<float>& axis, Quantity quantity) noexcept {
+    if (quantity != Quantity::phi && quantity != Quantity::theta_r) return true;
+    const float end = quantity == Quantity::phi ? float(pi) : float(pi / 2);
+    return axis.lower() == 0 && std::abs(axis.upper() - end) < 1e-6f * end;
+}
+
 MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) noexcept {
     const PackTable& table = view.layout;
-    if (table.kind >= table_kinds || table.rank < 1 || table.rank > max_rank) return PackStatus::bad_table;
-    if (table.rank_stride != (table.rank + rank_multiple - 1) / rank_multiple * rank_multiple)
+    if (table.kind >= table_kinds || table.even_rank < 1 || table.even_rank > max_rank || table.odd_rank > max_rank)
         return PackStatus::bad_table;
+    if (table.rank_stride != padded_rank(table.even_rank) + padded_rank(table.odd_rank) || table.rank_stride > max_rank)
+        return PackStatus::bad_table;
+    if (!view.has_exit() && table.odd_rank != 0) return PackStatus::bad_table;
     if (table.axis_count < 1 || table.axis_count > max_axes) return PackStatus::bad_table;
     if (!axes_fit(table)) return PackStatus::bad_axis;
     if (!finite(table.low) || !finite(table.high)) return PackStatus::bad_number;
@@ -224,6 +237,8 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
         if (!inside(axis.rows_offset, row_bytes, total)) return PackStatus::out_of_bounds;
         const PackStatus status = check_knots(view.axis(k));
         if (status != PackStatus::ok) return status;
+        const auto quantity = static_cast<Quantity>(axis.quantity);
+        if (!half_circle(view.axis(k), quantity)) return PackStatus::bad_knots;
     }
     const std::uint32_t offsets[2] = {table.scales_offset, table.integrals_offset};
     for (std::uint32_t i = 0; i < (view.has_exit() ? 2u : 1u); ++i) {

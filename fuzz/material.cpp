@@ -1,0 +1,23 @@
+// libFuzzer: text -> a material, a scene. What is accepted must be a fibre that the model can answer for.
+#include <cstdlib>
+
+#include "medulla/fur_parameters.hpp"
+#include "tables/error.hpp"
+#include "tables/material.hpp"
+
+using namespace medulla;
+using namespace medulla::tables;
+
+extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
+    const std::string text(reinterpret_cast<const char*>(data), size);
+    try {
+        if (check(parse_material(text, "fuzz").fur) != FurStatus::ok) std::abort();
+    } catch (const Error&) {
+    }
+    try {
+        for (const Material& material : parse_scene(text, "fuzz"))
+            if (check(material.fur) != FurStatus::ok) std::abort();
+    } catch (const Error&) {
+    }
+    return 0;
+}

@@ -1,0 +1,68 @@
+#include "sim2d/disc_solve.hpp"
+
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
+
+#include "sim2d/disc_gmres.hpp"
+#include "sim2d/disc_single.hpp"
+#include "sim2d/disc_transport.hpp"
+
+namespace medulla::sim2d {
+namespace {
+
+/// High modes fade into denormals, which cost 100 cycles each: rounds them to zero while alive.
+class FlushDenormals {
+  public:
+#if defined(__SSE2__)
+    FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040u); }  // flush to zero, denormals are zeros
+    ~FlushDenormals() { _mm_setcsr(saved_); }
+    FlushDenormals(const FlushDenormals&) = delete;
+    FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+  private:
+    unsigned saved_;
+#else
+    FlushDenormals() {}  // elsewhere only slower
+#endif
+};
+
+}  // namespace
+
+DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a, double tolerance) {
+    const std::size_t stride = grid.stride;
+    const FlushDenormals flush;
+    const double extinction = sigma + sigma_a;
+    DiscTransport transport(grid, extinction);
+    DiscField radiance(transport.size()), source(transport.size());
+    transport.first_collision(source);
+    transport.stream(source, radiance, stride);
+    transport.uniform_radiance(radiance);
+    transport.scatter(radiance, source, stride, 1);  // second collisions over sigma^2, column 0 over sigma: finite at 0
+    const auto collide = [&](const DiscField& in, DiscField& out, std::size_t active) {
+        transport.stream(in, radiance, active);
+        transport.scatter(radiance, out, active, sigma);
+    };
+    const DiscIteration many = gmres(collide, std::move(source), stride, tolerance);
+
+    std::vector<DiscReal> rows(2 * grid.offset.size() * stride);
+    transport.stream(many.solution, radiance, stride, rows.data());
+    DiscExit exit;
+    exit.iterations = many.iterations;
+    exit.residual = many.residual;
+    exit.offset = grid.offset;
+    exit.modes = stride - 1;
+    for (std::size_t m = 0; m + 1 < grid.offset.size(); ++m) {
+        const double collided = disc_energy(extinction, grid.offset[m]) / extinction;  // F / sigma
+        const DiscReal *re = &rows[2 * m * stride], *im = re + stride;
+        exit.rest.push_back(static_cast<double>(re[0]) / collided);
+        for (std::size_t k = 1; k < stride; ++k)
+            exit.lobes.push_back(sigma / collided * std::complex<double>(re[k], im[k]));
+    }
+    // The last chord is the tangent: I / F -> J(r = 1, psi = pi / 2) / sigma.
+    exit.rest.push_back(transport.grazing(many.solution, 0).real());
+    for (std::size_t k = 1; k < stride; ++k) exit.lobes.push_back(sigma * transport.grazing(many.solution, k));
+    return exit;
+}
+
+}  // namespace medulla::sim2d

@@ -1,0 +1,154 @@
+#include "tables/precompute.hpp"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "tables/error.hpp"
+#include "tables/program.hpp"
+
+namespace medulla::tables {
+namespace {
+
+std::atomic<bool> stop{false};
+std::atomic<int> caught{0};
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
+
+/// Catches SIGINT and SIGTERM while it lives: the first asks to stop, the second ends the process at once.
+class Interrupts {
+  public:
+    Interrupts() {
+        stop = false, caught = 0;
+        struct sigaction action = {};
+        action.sa_handler = [](int number) {
+            if (caught.exchange(number) != 0) ::_exit(128 + number);
+            stop = true;
+        };
+        action.sa_flags = SA_RESTART;
+        ::sigaction(SIGINT, &action, &old_[0]);
+        ::sigaction(SIGTERM, &action, &old_[1]);
+    }
+    ~Interrupts() {
+        ::sigaction(SIGINT, &old_[0], nullptr);
+        ::sigaction(SIGTERM, &old_[1], nullptr);
+    }
+    Interrupts(const Interrupts&) = delete;
+    Interrupts& operator=(const Interrupts&) = delete;
+
+  private:
+    struct sigaction old_[2];
+};
+
+/// Whether the output holds this job already. Throws Error where it is of another one.
+std::optional<Tables> finished(const Job& job, const Tables& plan) {
+    if (!std::filesystem::exists(job.output)) return std::nullopt;
+    Tables tables = read_tables(job.output);
+    const Digest expected = configuration_hash(plan), found = configuration_hash(tables);
+    if (expected != found)
+        throw Error("{}: expected configuration {}, found {}: it belongs to another job", job.output, hex(expected),
+                    hex(found));
+    return tables;
+}
+
+/// Solves what `slices` misses and keeps it.
+void solve(const Job& job, const SliceSolver& solver, const ShardFolder& folder, const std::vector<SliceId>& slices,
+           const std::vector<bool>& kept) {
+    std::vector<SliceId> missing;
+    std::size_t cells = 0, done = 0;
+    for (std::size_t i = 0; i < slices.size(); ++i) {
+        const std::size_t count = slice_cells(table_of(solver.plan(), slices[i].table));
+        cells += count;
+        if (kept[i])
+            done += count;
+        else
+            missing.push_back(slices[i]);
+    }
+    Progress progress(job.progress, "precompute", cells, done);
+    in_parallel(missing.size(), job.request.threads, stop, [&](std::size_t i) {
+        const Slice slice = solver.solve(missing[i]);
+        folder.write(missing[i], slice);
+        progress.add(slice.cells);
+    });
+}
+
+std::size_t count_kept(const ShardFolder& folder, const std::vector<SliceId>& slices) {
+    std::size_t count = 0;
+    for (const SliceId& id : slices) count += std::filesystem::exists(folder.file_of(id));
+    return count;
+}
+
+void interrupted_if_asked(const ShardFolder& folder, const std::vector<SliceId>& slices) {
+    if (stop)
+        throw Interrupted(caught, "interrupted: {} of {} slices kept in {}; go on with --resume",
+                          count_kept(folder, slices), slices.size(), folder.path());
+}
+
+}  // namespace
+
+Tables assemble(const ShardFolder& folder, const Tables& plan) {
+    Tables tables = plan;
+    for (auto* table : {&tables.azimuthal, &tables.longitudinal})
+        if (*table) (*table)->allocate();
+    for (const SliceId& id : slices_of(plan)) {
+        std::string why;
+        const std::optional<Slice> slice = folder.read(id, why);
+        if (!slice) throw Error("{}: damaged: {}", folder.file_of(id), why);
+        put_slice(tables, id, *slice);
+    }
+    return tables;
+}
+
+JobReport run_job(const Job& job) {
+    const Interrupts interrupts;
+    const SliceSolver solver(job.request);
+    const Tables& plan = solver.plan();
+    ShardFolder folder(ShardFolder::beside(job.output), plan);
+    JobReport report;
+    report.shards = folder.path();
+    const std::vector<SliceId> all = slices_of(plan);
+    const std::vector<SliceId> slices = job.shard ? share_of(job.request, all, *job.shard) : by_cost(job.request, all);
+    report.slices = slices.size();
+    if (job.resume)
+        if (auto tables = finished(job, plan)) {
+            report.tables = std::move(*tables);
+            report.was_complete = true;
+            report.kept = slices.size();
+            if (!job.shard && std::filesystem::exists(folder.path())) {  // killed between the last two steps
+                folder.open(true);
+                folder.remove();
+            }
+            return report;
+        }
+    if (!job.resume && !job.shard && !folder.files().empty())
+        throw Error("{}: holds slices of an earlier run; go on with --resume, or delete it", folder.path());
+    folder.open(!job.shard);
+    try {
+        const std::vector<bool> kept = folder.kept(slices);
+        report.kept = static_cast<std::size_t>(std::count(kept.begin(), kept.end(), true));
+        if (job.shard && !job.resume && report.kept > 0)
+            throw Error("{}: holds {} of this worker's {} slices already; go on with --resume, or delete it",
+                        folder.path(), report.kept, slices.size());
+        solve(job, solver, folder, slices, kept);
+        interrupted_if_asked(folder, slices);
+        if (job.shard) {
+            report.tables = plan;
+            return report;
+        }
+        report.tables = assemble(folder, plan);
+        interrupted_if_asked(folder, slices);
+        write_tables(job.output, report.tables, job.compression, folder.scratch());
+    } catch (const Interrupted&) {
+        throw;
+    } catch (const Error& error) {
+        const std::size_t count = count_kept(folder, slices);
+        folder.remove_if_empty();
+        if (count == 0 || job.shard) throw;
+        throw Error("{}; {} of {} slices kept in {}, go on with --resume", error.what(), count, slices.size(),
+                    folder.path());
+    }
+    folder.remove();
+    return report;
+}
+
+}  // namespace medulla::tables

@@ -1,0 +1,129 @@
+// Compression end to end: packs keep the errors they report, sizes and errors asked for are met, lobes mirror.
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "medulla/lookup.hpp"
+#include "tables/axis.hpp"
+#include "tables/compress.hpp"
+#include "tables/error.hpp"
+#include "tables/simulate.hpp"
+
+using namespace medulla;
+using namespace medulla::tables;
+
+namespace {
+
+/// Both tables without noise, small but with the default's ranges.
+const Tables& small_tables() {
+    static const Tables tables = [] {
+        Request request = default_request();
+        request.method = Method::deterministic;
+        request.sigma = graded_axis("sigma", {0, 4, 6});
+        request.g = graded_axis("g", {0, 0.7, 4});
+        request.h = graded_axis("h", {0, 1, 6});
+        request.theta_i = graded_axis("theta_i", {0, pi / 2, 6});
+        request.bins = 180;
+        return simulate(request, ProgressMode::none);
+    }();
+    return tables;
+}
+
+struct Opened {
+    std::vector<unsigned char> bytes;
+    PackView view;
+    explicit Opened(std::vector<unsigned char> pack) : bytes(std::move(pack)) {
+        const OpenResult opened = open_pack(bytes.data(), bytes.size());
+        REQUIRE(opened.status == PackStatus::ok);
+        view = opened.pack;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("A pack of a table is the table within the error it reports", "[compress]") {
+    CompressOptions options;
+    options.rank = 8;
+    const CompressResult result = compress(small_tables(), options, "test");
+    const std::vector<LobeError> errors = compare(*table_source(small_tables()), *pack_source(result.pack, "test"));
+    REQUIRE(errors.size() == 3);
+    REQUIRE(result.tables.size() == 4);
+    for (std::size_t i = 0; i < 3; ++i) {
+        CHECK(errors[i].relative == result.errors[i].relative);
+        CHECK(errors[i].relative < 0.1);
+        CHECK(errors[i].least >= 0);
+        // Normalisation and rounding move the factors' own error only a little.
+        CHECK(errors[i].relative < 1.5 * result.tables[i].fit_error + 1e-3);
+    }
+    const CompressResult again = compress(small_tables(), options, "test");
+    CHECK(again.pack == result.pack);
+}
+
+TEST_CASE("Bytes and errors that are asked for are met, and more bytes are never worse by much", "[compress]") {
+    CompressOptions options;
+    double before = 1;
+    for (const std::size_t bytes : {20000, 32000}) {
+        options.max_bytes = bytes;
+        const CompressResult result = compress(small_tables(), options, "test");
+        CHECK(result.pack.size() <= bytes);
+        CHECK(result.pack.size() > bytes * 3 / 5);  // steps of eight components, 2 kB of text room, at most 128 a part
+        double sum = 0;
+        for (const TableReport& table : result.tables) sum += table.fit_error * table.fit_error;
+        CHECK(sum < before);
+        before = sum;
+    }
+    options.max_bytes = 4000;
+    CHECK_THROWS_AS(compress(small_tables(), options, "test"), Error);
+    options.max_bytes.reset();
+    for (const double error : {0.02}) {
+        options.max_error = error;
+        for (const TableReport& table : compress(small_tables(), options, "test").tables)
+            if (table.kind != TableKind::back_fraction) CHECK(table.fit_error <= error);
+    }
+    options.max_error = 1e-9;  // the exit splines alone leave more
+    CHECK_THROWS_AS(compress(small_tables(), options, "test"), Error);
+}
+
+TEST_CASE("Lobes are continuous where h and theta_i change sign", "[compress]") {
+    CompressOptions options;
+    const Opened pack(compress(small_tables(), options, "test").pack);
+    for (float y = -1.5f; y < 1.6f; y += 0.1f) {
+        // Odd factors vanish at 0: what is left there is the float rounding of a few coefficients, 1e-6.
+        CHECK(azimuthal(pack.view, 2, 0.5f, 0, y) == Approx(azimuthal(pack.view, 2, 0.5f, 0, -y)).epsilon(1e-5));
+        CHECK(azimuthal(pack.view, 2, 0.5f, 1e-30f, y) == azimuthal(pack.view, 2, 0.5f, -1e-30f, -y));
+        for (const Side side : {Side::back, Side::forward})
+            CHECK(longitudinal(pack.view, side, 2, 0.5f, 0, y) ==
+                  Approx(longitudinal(pack.view, side, 2, 0.5f, 0, -y)).epsilon(1e-5));
+    }
+}
+
+TEST_CASE("Non-negative factors: every component is a density between the nodes too", "[compress]") {
+    CompressOptions options;
+    options.solver = tensor::Solver::nonnegative;
+    options.rank = 10;
+    const CompressResult result = compress(small_tables(), options, "test");
+    const Opened pack(result.pack);
+    for (const TableKind kind : {TableKind::azimuthal, TableKind::longitudinal_back, TableKind::longitudinal_forward}) {
+        const TableView& table = pack.view[kind];
+        REQUIRE(table.layout.even_rank == 10);
+        REQUIRE(table.layout.odd_rank == 10);
+        const std::uint32_t exit = table.parameter_axes(), middle = table.even_stride();
+        for (std::uint32_t r = 0; r < 10; ++r) {
+            for (std::uint32_t k = 0; k < exit; ++k)
+                for (std::uint32_t j = 0; j < table.layout.axes[k].spans + 3; ++j) {
+                    const auto even = detail::load<std::int16_t>(table.row(k, j) + 2 * r);
+                    CHECK(even >= 0);
+                    CHECK(even == detail::load<std::int16_t>(table.row(k, j) + 2 * (middle + r)));
+                }
+            const auto scale = [&](std::uint32_t i) {
+                return static_cast<double>(detail::load<float>(table.bytes + table.layout.scales_offset + 4 * i));
+            };
+            for (std::uint32_t j = 0; j < table.layout.axes[exit].spans + 3; ++j) {
+                const double even = scale(r) * detail::load<std::int16_t>(table.row(exit, j) + 2 * r);
+                const double odd =
+                    scale(middle + r) * detail::load<std::int16_t>(table.row(exit, j) + 2 * (middle + r));
+                CHECK(even - std::abs(odd) >= -1.01 * (scale(r) + scale(middle + r)));  // half a unit each, and float
+            }
+        }
+    }
+    for (const LobeError& error : result.errors) CHECK(error.relative < 0.4);
+}

@@ -36,7 +36,7 @@ double forward_moment(double sigma, double mu_i, double mu_r) {
     if (!(mu_r > 0)) return 0;
     const double a = 2 / mu_r, b = mu_i > 0 ? 2 / mu_i : HUGE_VAL;
     if (std::isinf(b)) return a * std::exp(-sigma * a);  // all of it scatters on the face
-    static const GaussRule rule = gauss_legendre(12);
+    static const GaussRule rule = unit_gauss_rule(12);
     if (sigma * std::abs(b - a) < 2) {
         double sum = 0;
         for (std::size_t i = 0; i < rule.nodes.size(); ++i) {
@@ -58,8 +58,8 @@ SlabSingle slab_single_lobes(double sigma, double g, double theta_i, std::size_t
     const double pole = g == 0 ? 100 : std::min(100.0, -std::log(std::abs(g)) * 2 / width);
     const double rho = pole + std::sqrt(pole * pole + 1);
     const int count = std::clamp(static_cast<int>(std::ceil(9.2 / std::log(rho))), 2, 64);
-    const GaussRule plain = gauss_legendre(std::max(count, bins < 90 ? 24 : 2));
-    const GaussRule graded = gauss_legendre(std::max(count, 32));
+    const GaussRule plain = unit_gauss_rule(std::max(count, bins < 90 ? 24 : 2));
+    const GaussRule graded = unit_gauss_rule(std::max(count, 32));
     const double mu_i = slab_cosine(theta_i), energy = slab_energy(sigma, theta_i);
     SlabSingle out;
     out.back.assign(bins, 0.0), out.forward.assign(bins, 0.0);

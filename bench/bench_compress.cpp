@@ -112,7 +112,7 @@ double kind_bytes(const TableReport& report, const std::vector<unsigned char>& p
     const TableView& table = opened.pack[report.kind];
     double bytes = 8.0 * table.layout.rank_stride;
     for (std::uint32_t k = 0; k < table.layout.axis_count; ++k)
-        bytes += 2.0 * (table.layout.axes[k].spans + 3) * table.layout.rank_stride;
+        bytes += (table.layout.axes[k].spans + 3.0) * static_cast<double>(row_bytes(table.layout.rank_stride));
     return bytes;
 }
 

@@ -131,11 +131,11 @@ Axis graded_axis(const std::string& name, const Range& range) {
     for (std::size_t i = 0; i + 1 < range.count; ++i) {
         const double u = static_cast<double>(i) / static_cast<double>(range.count - 1);
         double t = u;
-        // Of square roots: the same nodes on every processor.
+        // Of square roots and quotients: the same nodes on every processor.
         const double rest = 1 - u, root = std::sqrt(rest);
         if (name == "sigma" || name == "absorption") t = u * u * std::sqrt(u);
         if (name == "g") t = 1 - rest * root;
-        if (name == "theta_i") t = 1 - rest * std::sqrt(root);
+        if (name == "theta_i") t = 1 - 1.2 * rest * rest / (rest + 0.2);
         if (name == "h") t = sim2d::portable::sin(pi / 2 * (1 - rest * root));
         axis.values[i] = range.low + (range.high - range.low) * t;
     }

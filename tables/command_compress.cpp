@@ -9,10 +9,13 @@
 namespace medulla::tables {
 namespace {
 
+/// Of the pack that ships with the runtime.
+constexpr std::size_t default_bytes = 153600;
+
 struct CompressWords {
     std::vector<std::string> files;
     std::string output, solver = "lm";
-    int rank = 16;
+    std::optional<int> rank;
     double max_error = 0;
     std::size_t max_bytes = 0;
     std::uint64_t seed = 1;
@@ -61,7 +64,7 @@ void run_compress(const CompressWords& words) {
     const std::string& first = words.files[0];
     const std::string output = words.output.empty() ? first.substr(0, first.rfind(".h5")) + ".furpack" : words.output;
     CompressOptions options;
-    options.rank = words.rank;
+    if (words.rank) options.rank = *words.rank;
     options.seed = words.seed;
     options.solver = words.solver == "als" ? tensor::Solver::als : tensor::Solver::lm;
     if (words.nonnegative) options.solver = tensor::Solver::nonnegative;
@@ -69,14 +72,22 @@ void run_compress(const CompressWords& words) {
     if (words.max_bytes > 0) options.max_bytes = words.max_bytes;
     std::string input;
     for (const std::string& file : words.files) input += (input.empty() ? "" : ", ") + file_name(file);
-    const CompressResult result = compress(read_all(words.files), options, input);
+    const Tables tables = read_all(words.files);
+    const CompressResult result = compress(tables, options, input);
     write_file(output, result.pack.data(), result.pack.size());
+    // Who asked for no size is told what the default pack's would give.
+    std::optional<CompressResult> larger;
+    if (!words.rank && !options.max_error && !options.max_bytes) {
+        options.max_bytes = default_bytes;
+        larger = compress(tables, options, input);
+    }
     if (words.json) {
         nlohmann::ordered_json json = {
             {"output", output}, {"bytes", result.pack.size()}, {"seconds", result.solve_seconds}};
         for (const TableReport& report : result.tables)
             json["factors"][medulla::tables::name_of(report.kind)] = to_json(report);
         json["errors"] = to_json(result.errors);
+        if (larger) json["max_bytes_153600"] = {{"bytes", larger->pack.size()}, {"errors", to_json(larger->errors)}};
         fmt::print("{}\n", json.dump());
         return;
     }
@@ -91,6 +102,11 @@ void run_compress(const CompressWords& words) {
     }
     print(result.errors);
     fmt::print("{}: {} bytes in {:.2f} s\n", output, result.pack.size(), result.solve_seconds);
+    if (!larger) return;
+    std::string errors;
+    for (const LobeError& error : larger->errors)
+        errors += fmt::format("{}{} {:.1e}", errors.empty() ? "" : ", ", name_of(error.kind), error.relative);
+    fmt::print("with --max-bytes {}: {}\n", default_bytes, errors);
 }
 
 struct DiffWords {
@@ -146,9 +162,8 @@ void add_compress(CLI::App& app, Action& action) {
                 ->expected(1, 2);
             command.add_option("-o,--output", words.output, "pack to write (default: FILE with .furpack)");
             auto* size = command.add_option_group("size")->require_option(0, 1);
-            size->add_option("--rank", words.rank, "components of each part: lobes have a mirror-even and an odd one")
-                ->check(CLI::Range(1, static_cast<int>(max_rank / 2)))
-                ->capture_default_str();
+            size->add_option("--rank", words.rank, "components of each part: lobes have a mirror-even and an odd one (default 16)")
+                ->check(CLI::Range(1, static_cast<int>(max_rank / 2)));
             size->add_option("--max-error", words.max_error, "smallest pack whose factors keep this relative L2")
                 ->check(CLI::PositiveNumber);
             size->add_option("--max-bytes", words.max_bytes, "least error within this many bytes")

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int rank_step = static_cast<int>(rank_multiple), greatest_rank = static_cast<int>(max_rank);
 /// Of the slab's energies: three small axes, more rank is only rounding.
-constexpr int energy_rank = 16;
+constexpr int energy_rank = 24;
 /// Of the solves that say how hard each part is.
 constexpr int pilot_rank = 32;
 /// Room kept for the provenance text when a pack must fit into a number of bytes.

@@ -19,6 +19,14 @@ class Blob {
         if (count > 0) std::memcpy(bytes_.data() + offset, data, count * sizeof(T));
         return static_cast<std::uint32_t>(offset);
     }
+    /// The same for what tables share: the knots of equal axes are written once.
+    std::uint32_t append_knots(const std::vector<Knot<float>>& knots) {
+        const std::size_t size = knots.size() * sizeof knots[0];
+        for (const auto& [offset, length] : knots_)
+            if (length == size && std::memcmp(bytes_.data() + offset, knots.data(), size) == 0) return offset;
+        knots_.emplace_back(append(knots.data(), knots.size()), size);
+        return knots_.back().first;
+    }
     template <class T>
     void put(std::size_t offset, const T& value) {
         std::memcpy(bytes_.data() + offset, &value, sizeof value);
@@ -27,6 +35,7 @@ class Blob {
 
   private:
     std::vector<unsigned char> bytes_;
+    std::vector<std::pair<std::uint32_t, std::size_t>> knots_;  ///< offset and bytes
 };
 
 PackTable write_table(Blob& blob, const PackedTable& table) {
@@ -37,7 +46,7 @@ PackTable write_table(Blob& blob, const PackedTable& table) {
     if (stride > max_rank) throw Error("pack: expected at most {} components, found {}", max_rank, stride);
     // Where component r is stored: even ones from 0 on, odd ones from the next multiple on.
     const auto place = [&](Eigen::Index r) {
-        return static_cast<std::size_t>(r < table.even_rank ? r : r - table.even_rank + padded_rank(even));
+        return static_cast<std::uint32_t>(r < table.even_rank ? r : r - table.even_rank + padded_rank(even));
     };
     PackTable layout = {};
     layout.kind = static_cast<std::uint32_t>(table.kind);
@@ -52,16 +61,17 @@ PackTable write_table(Blob& blob, const PackedTable& table) {
     for (std::size_t k = 0; k < table.axes.size(); ++k) {
         const PackedAxis& axis = table.axes[k];
         const Eigen::MatrixXd& rows = axis.coefficients;
-        std::vector<std::int16_t> stored(static_cast<std::size_t>(rows.rows()) * stride, 0);
+        std::vector<unsigned char> stored(static_cast<std::size_t>(rows.rows()) * row_bytes(stride), 0);
         const bool exit = table.has_exit() && k + 1 == table.axes.size();
         const Eigen::VectorXd basis_integrals = axis.spline.integrals();
         for (Eigen::Index r = 0; r < rank; ++r) {
             const double greatest = rows.col(r).cwiseAbs().maxCoeff();
-            const double unit = greatest / 32767;
+            const double unit = greatest / greatest_number;
             scales[r] *= unit;
             for (Eigen::Index i = 0; i < rows.rows(); ++i) {
                 const double q = greatest > 0 ? std::nearbyint(rows(i, r) / unit) : 0;
-                stored[static_cast<std::size_t>(i) * stride + place(r)] = static_cast<std::int16_t>(q);
+                store_number(stored.data() + static_cast<std::size_t>(i) * row_bytes(stride), place(r),
+                             static_cast<int>(q));
                 if (exit && r < table.even_rank) integrals[r] += 2 * q * basis_integrals[i];
             }
         }
@@ -70,7 +80,7 @@ PackTable write_table(Blob& blob, const PackedTable& table) {
         out.quantity = static_cast<std::uint32_t>(axis.quantity);
         out.nodes = axis.nodes;
         out.spans = axis.spline.spans();
-        out.knots_offset = blob.append(knots.data(), knots.size());
+        out.knots_offset = blob.append_knots(knots);
         out.rows_offset = blob.append(stored.data(), stored.size());
     }
     const auto floats = [&](const Eigen::VectorXd& values) {

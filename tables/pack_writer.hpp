@@ -30,8 +30,8 @@ struct PackedTable {
     bool has_exit() const { return kind != TableKind::back_fraction; }
 };
 
-/// Lays the tables out as a pack. Columns are stored as int16 with one scale per component (relative rounding of a
-/// column's greatest coefficient: 2^-16).
+/// Lays the tables out as a pack. Columns are stored as 12-bit numbers with one scale per component (relative
+/// rounding of a column's greatest coefficient: 2^-12).
 std::vector<unsigned char> write_pack(const std::vector<PackedTable>& tables, const std::string& provenance);
 
 }  // namespace medulla::tables

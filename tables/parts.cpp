@@ -151,9 +151,9 @@ Part energy_part(const Table& table) {
 }  // namespace
 
 std::size_t Part::component_bytes() const {
-    std::size_t bytes = 4 + 4;
-    for (const PackedAxis& axis : axes) bytes += 2 * static_cast<std::size_t>(axis.spline.size());
-    return bytes * static_cast<std::size_t>(copies());
+    std::size_t rows = 0;
+    for (const PackedAxis& axis : axes) rows += static_cast<std::size_t>(axis.spline.size());
+    return (4 + 4 + rows * row_bytes(rank_multiple) / rank_multiple) * static_cast<std::size_t>(copies());
 }
 
 std::vector<double> exit_breakpoints(TableKind kind, std::size_t bins, std::size_t spans) {

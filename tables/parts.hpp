@@ -30,7 +30,7 @@ struct Part {
     bool lobes() const { return kind != TableKind::back_fraction; }
     /// Components of the pack for each component of the model.
     int copies() const { return static_cast<int>(std::max<std::size_t>(1, exit_maps.size())); }
-    /// Bytes that one component of the model takes in a pack (rows of int16, a scale, an integral).
+    /// Bytes that one component of the model takes in a pack (12-bit rows, a scale, an integral).
     std::size_t component_bytes() const;
 };
 

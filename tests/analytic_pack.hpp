@@ -120,7 +120,7 @@ class PackBuilder {
             table.even_rank = std::uint32_t(spec.even), table.odd_rank = std::uint32_t(spec.rank - spec.even);
             table.rank_stride = padded_rank(table.even_rank) + padded_rank(table.odd_rank);
             const auto place = [&](int r) {
-                return std::size_t(r < spec.even ? r : r - spec.even + int(padded_rank(table.even_rank)));
+                return std::uint32_t(r < spec.even ? r : r - spec.even + int(padded_rank(table.even_rank)));
             };
             table.axis_count = std::uint32_t(spec.axes.size());
             std::vector<float> scales(table.rank_stride, 0.0f), integrals(table.rank_stride, 0.0f);
@@ -129,20 +129,20 @@ class PackBuilder {
                 const AxisSpec& axis = spec.axes[k];
                 const auto spans = std::uint32_t(axis.breakpoints.size() - 1);
                 const auto knots = packed_knots<float>(with_ghosts(axis.breakpoints));
-                std::vector<std::int16_t> rows(std::size_t(spans + 3) * table.rank_stride, 0);
+                std::vector<unsigned char> rows(std::size_t(spans + 3) * row_bytes(table.rank_stride), 0);
                 for (int r = 0; r < spec.rank; ++r) {
                     const auto c = interpolate(axis.breakpoints, [&](double x) { return axis.factor(r, x); });
                     double most = 0;
                     for (double x : c) most = std::max(most, std::abs(x));
-                    const double unit = most > 0 ? most / 32767 : 1;
+                    const double unit = most > 0 ? most / greatest_number : 1;
                     for (std::size_t j = 0; j < c.size(); ++j)
-                        rows[j * table.rank_stride + place(r)] = std::int16_t(std::lround(c[j] / unit));
+                        store_number(&rows[j * row_bytes(table.rank_stride)], place(r), int(std::lround(c[j] / unit)));
                     scales[place(r)] *= float(unit);
                 }
                 table.axes[k].quantity = std::uint32_t(axis.quantity);
                 table.axes[k].nodes = table.axes[k].spans = spans;
                 table.axes[k].knots_offset = put(knots.data(), knots.size() * sizeof knots[0]);
-                table.axes[k].rows_offset = put(rows.data(), rows.size() * 2);
+                table.axes[k].rows_offset = put(rows.data(), rows.size());
                 if (k + 1 == spec.axes.size())
                     integrals = exit_integrals(knots, rows, spans, table.rank_stride, padded_rank(table.even_rank));
             }
@@ -170,7 +170,7 @@ class PackBuilder {
     /// Over both halves of the axis: twice the stored one's for even components, 0 for odd ones. Two Gauss nodes per
     /// span integrate a cubic exactly.
     static std::vector<float> exit_integrals(const std::vector<Knot<float>>& knots,
-                                             const std::vector<std::int16_t>& rows, std::uint32_t spans,
+                                             const std::vector<unsigned char>& rows, std::uint32_t spans,
                                              std::uint32_t stride, std::uint32_t even) {
         std::vector<double> sum(stride, 0.0);
         const AxisView<float> axis = {reinterpret_cast<const unsigned char*>(knots.data()), spans};
@@ -180,7 +180,7 @@ class PackBuilder {
                 const auto w = spline_weights(axis, Cell<float>{i, float((a + b) / 2 + x * (b - a) / 2)});
                 for (std::uint32_t k = 0; k < 4; ++k)
                     for (std::uint32_t r = 0; r < even; ++r)
-                        sum[r] += (b - a) * double(w.w[k]) * rows[(i + k) * stride + r];
+                        sum[r] += (b - a) * double(w.w[k]) * load_number(&rows[(i + k) * row_bytes(stride)], r);
             }
         }
         return std::vector<float>(sum.begin(), sum.end());

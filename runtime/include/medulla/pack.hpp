@@ -12,14 +12,34 @@
 namespace medulla {
 
 inline constexpr char pack_magic[8] = {'F', 'U', 'R', 'P', 'A', 'C', 'K', '\n'};
-inline constexpr std::uint32_t pack_version = 2;
-inline constexpr std::uint32_t max_rank = 256;
+inline constexpr std::uint32_t pack_version = 3;
+inline constexpr std::uint32_t max_rank = 512;
 inline constexpr std::uint32_t max_axes = 6;
 inline constexpr std::uint32_t max_spans = 4096;
 inline constexpr std::uint32_t rank_multiple = 8;  ///< rows are padded with zeros to a multiple of this rank
 
 MEDULLA_FN constexpr std::uint32_t padded_rank(std::uint32_t rank) noexcept {
     return (rank + rank_multiple - 1) / rank_multiple * rank_multiple;
+}
+
+/// Factors are whole numbers of 12 bits, -2047 .. 2047, eight in 12 bytes: the upper eight bits of each, then the lower
+/// four, two to a byte (the even component's in the lower half).
+inline constexpr int greatest_number = 2047;
+MEDULLA_FN constexpr std::size_t row_bytes(std::uint32_t stride) noexcept { return std::size_t(stride) / 2 * 3; }
+
+/// Number r of a row.
+MEDULLA_FN int load_number(const unsigned char* row, std::uint32_t r) noexcept {
+    const unsigned char* eight = row + row_bytes(r / 8 * 8);
+    const int lower = eight[8 + r % 8 / 2] >> (r % 2 * 4) & 15, upper = eight[r % 8];
+    return (upper < 128 ? upper : upper - 256) * 16 + lower;
+}
+
+/// Sets number r of a row whose number was 0.
+inline void store_number(unsigned char* row, std::uint32_t r, int number) noexcept {
+    unsigned char* eight = row + row_bytes(r / 8 * 8);
+    const auto bits = static_cast<unsigned>(number);
+    eight[r % 8] = static_cast<unsigned char>(bits >> 4 & 255u);
+    eight[8 + r % 8 / 2] |= static_cast<unsigned char>((bits & 15u) << (r % 2 * 4));
 }
 
 /// The tables a pack can hold. The numbers are part of the format.
@@ -49,7 +69,7 @@ struct PackAxis {
     std::uint32_t nodes;         ///< nodes (or bins) of the table it was made from, for information
     std::uint32_t spans;         ///< of the spline
     std::uint32_t knots_offset;  ///< Knot<float>[spans + 5]
-    std::uint32_t rows_offset;   ///< int16[spans + 3][rank_stride]: spline coefficients, one row per coefficient
+    std::uint32_t rows_offset;   ///< spans + 3 rows of rank_stride numbers: spline coefficients, one row for each
     std::uint32_t reserved[3];   ///< 0
 };
 static_assert(sizeof(PackAxis) == 32);
@@ -60,7 +80,7 @@ struct PackTable {
     std::uint32_t odd_rank;       ///< components that change sign there; 0 without an exit axis
     std::uint32_t rank_stride;    ///< each of the two rounded up to rank_multiple, and added: 8 .. max_rank
     std::uint32_t axis_count;     ///< 1 .. max_axes; the last one is the exit direction, where there is one
-    std::uint32_t scales_offset;  ///< float[rank_stride]: weight of one unit of int16 in every axis
+    std::uint32_t scales_offset;  ///< float[rank_stride]: weight of one unit in every axis
     std::uint32_t
         integrals_offset;  ///< float[rank_stride]: integral of the exit spline of a component; 0: no exit axis
     float low, high;       ///< least and greatest value of the table it was made from
@@ -90,9 +110,9 @@ struct TableView {
     }
     /// Components [0, even_stride) are mirror-even, [even_stride, rank_stride) mirror-odd.
     MEDULLA_FN std::uint32_t even_stride() const noexcept { return padded_rank(layout.even_rank); }
-    /// Row `row` of axis k: int16[rank_stride].
+    /// Row `row_index` of axis k: row_bytes(rank_stride) bytes of numbers.
     MEDULLA_FN const unsigned char* row(std::uint32_t k, std::uint32_t row_index) const noexcept {
-        return bytes + layout.axes[k].rows_offset + std::size_t(row_index) * layout.rank_stride * 2;
+        return bytes + layout.axes[k].rows_offset + std::size_t(row_index) * row_bytes(layout.rank_stride);
     }
     MEDULLA_FN bool has_exit() const noexcept { return layout.integrals_offset != 0; }
     MEDULLA_FN std::uint32_t parameter_axes() const noexcept { return layout.axis_count - (has_exit() ? 1u : 0u); }
@@ -232,9 +252,9 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
     for (std::uint32_t k = 0; k < table.axis_count; ++k) {
         const PackAxis& axis = table.axes[k];
         const std::uint64_t knot_bytes = std::uint64_t(axis.spans + 1 + 2 * ghost_knots) * sizeof(Knot<float>);
-        const std::uint64_t row_bytes = std::uint64_t(axis.spans + 3) * table.rank_stride * 2;
+        const std::uint64_t rows = std::uint64_t(axis.spans + 3) * row_bytes(table.rank_stride);
         if (!inside(axis.knots_offset, knot_bytes, total)) return PackStatus::out_of_bounds;
-        if (!inside(axis.rows_offset, row_bytes, total)) return PackStatus::out_of_bounds;
+        if (!inside(axis.rows_offset, rows, total)) return PackStatus::out_of_bounds;
         const PackStatus status = check_knots(view.axis(k));
         if (status != PackStatus::ok) return status;
         const auto quantity = static_cast<Quantity>(axis.quantity);

@@ -54,9 +54,8 @@ Range parse_range(const std::string& text, const std::string& option, std::size_
 
 /// Nodes of a parameter axis over a range, graded where lobes change fastest (docs/accuracy.md):
 /// sigma and absorption towards 0 (u^2.5), g towards 1 (1 - v^1.5, v = 1 - u), theta_i towards 90 degrees
-/// (1 - 1.2 v^2 / (v + 0.2): even steps of the spline's variable there, of theta_i below), and asin h towards 90 degrees
-/// (1 - v^1.5).
-/// `range` is in the axis's own unit (theta_i: radians).
+/// (1 - 1.2 v^2 / (v + 0.2): even steps of the spline's variable there, of theta_i below), and asin h towards 90
+/// degrees (1 - v^1.5). `range` is in the axis's own unit (theta_i: radians).
 Axis graded_axis(const std::string& name, const Range& range);
 
 }  // namespace medulla::tables

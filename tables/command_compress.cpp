@@ -162,7 +162,8 @@ void add_compress(CLI::App& app, Action& action) {
                 ->expected(1, 2);
             command.add_option("-o,--output", words.output, "pack to write (default: FILE with .furpack)");
             auto* size = command.add_option_group("size")->require_option(0, 1);
-            size->add_option("--rank", words.rank, "components of each part: lobes have a mirror-even and an odd one (default 16)")
+            size->add_option("--rank", words.rank,
+                             "components of each part: lobes have a mirror-even and an odd one (default 16)")
                 ->check(CLI::Range(1, static_cast<int>(max_rank / 2)));
             size->add_option("--max-error", words.max_error, "smallest pack whose factors keep this relative L2")
                 ->check(CLI::PositiveNumber);

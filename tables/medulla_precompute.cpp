@@ -133,7 +133,8 @@ void declare(CLI::App& app, Words& words) {
     app.add_option("--sigma-range", words.sigma, "optical radii LO:HI[:N], nodes denser towards LO (default 0:16:24)");
     app.add_option("--g-range", words.g, "anisotropy LO:HI[:N], nodes denser towards HI (default 0:0.95:16)");
     app.add_option("--h-range", words.h, "offsets LO:HI[:N], nodes denser towards HI (default 0:1:16)");
-    app.add_option("--theta-range", words.theta, "inclinations in degrees LO:HI[:N], nodes denser towards HI (default 0:90:16)");
+    app.add_option("--theta-range", words.theta,
+                   "inclinations in degrees LO:HI[:N], nodes denser towards HI (default 0:90:16)");
     app.add_option("--bins", words.bins, "exit directions over the full circle, even")->capture_default_str();
     app.add_option("--method", words.method, "how each cell is solved")
         ->check(CLI::IsMember({"auto", "analog", "mc", "deterministic"}))

@@ -142,8 +142,7 @@ class PackSource : public Source {
             const unsigned char* row = table.row(exit, j);
             double part[2] = {0, 0};
             for (std::uint32_t r = 0; r < stride; ++r)
-                part[r < middle ? 0 : 1] +=
-                    static_cast<double>(contraction.weight[r]) * load_number(row, r);
+                part[r < middle ? 0 : 1] += static_cast<double>(contraction.weight[r]) * load_number(row, r);
             const auto scale = static_cast<double>(contraction.inverse_integral);
             coefficients[0][j] = (part[0] + part[1]) * scale, coefficients[1][j] = (part[0] - part[1]) * scale;
         }

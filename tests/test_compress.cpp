@@ -119,8 +119,7 @@ TEST_CASE("Non-negative factors: every component is a density between the nodes 
             };
             for (std::uint32_t j = 0; j < table.layout.axes[exit].spans + 3; ++j) {
                 const double even = scale(r) * load_number(table.row(exit, j), r);
-                const double odd =
-                    scale(middle + r) * load_number(table.row(exit, j), middle + r);
+                const double odd = scale(middle + r) * load_number(table.row(exit, j), middle + r);
                 CHECK(even - std::abs(odd) >= -1.01 * (scale(r) + scale(middle + r)));  // half a unit each, and float
             }
         }

@@ -41,6 +41,8 @@ nlohmann::ordered_json info(const std::string& path) {
             out["method"] = table->method;
             out["seed"] = table->seed;
             out["paths"] = table->paths;
+            if (table->target_error > 0) out["target_error"] = table->target_error;
+            if (table->time_budget > 0) out["time_budget"] = table->time_budget;
             for (const Axis& axis : table->axes) out["axes"].push_back(axis_json(axis));
             out["standard_error"] = {
                 {"median", median(table->standard_error)},

@@ -45,6 +45,11 @@ void check_request(const Request& request) {
         throw Error("--bins: expected an even number from 8 to 4096, found {}", request.bins);
     if (request.paths < 1 || request.paths > (std::uint64_t{1} << 40))
         throw Error("--paths: expected 1 to 2^40, found {}", request.paths);
+    if (request.target_error != 0 && !(request.target_error >= least_target && request.target_error <= greatest_target))
+        throw Error("--target-error: expected {:g} to {:g}, found {:g}", least_target, greatest_target,
+                    request.target_error);
+    if (!(request.time_budget >= 0 && request.time_budget <= 1e9))
+        throw Error("--time-budget: expected more than 0 and at most 1e9 seconds, found {:g}", request.time_budget);
     if (request.threads < 0 || request.threads > 1024)
         throw Error("--threads: expected 0 (all) to 1024, found {}", request.threads);
 }

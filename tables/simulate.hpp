@@ -25,6 +25,8 @@ class SliceSolver {
 
     const Tables& plan() const;
     Slice solve(const SliceId& id) const;
+    /// The same slice to another error; 0: by the request's paths, or to the noise-free solvers' usual error.
+    Slice solve(const SliceId& id, double target_error) const;
 
   private:
     struct State;

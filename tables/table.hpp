@@ -14,15 +14,16 @@ namespace medulla::tables {
 /// C^N or C^M on its nodes. The last axis is the exit direction; the others index a lobe ("cell"), row-major.
 /// Azimuthal: sigma, g, [absorption,] h, phi. Longitudinal: sigma, g, theta_i, side, theta_r.
 struct Table {
-    std::string name;                    ///< "azimuthal" or "longitudinal"
-    std::vector<Axis> axes;              ///< in the order of the array
-    std::vector<float> lobe;             ///< [cells][bins] density per radian, bin averages, integral 1
-    std::vector<double> energy;          ///< [cells] scattered energy per unit incident energy
-    std::vector<double> energy_error;    ///< [cells] its standard error (0: closed form)
-    std::vector<double> standard_error;  ///< [cells] relative L2 error of the lobe
-    std::vector<double> mean_length;     ///< [cells] mean path of the scattered light inside the medium [radii]
-    std::string method;                  ///< how it was solved
-    std::uint64_t seed = 0, paths = 0;   ///< of the random methods; 0 otherwise
+    std::string name;                          ///< "azimuthal" or "longitudinal"
+    std::vector<Axis> axes;                    ///< in the order of the array
+    std::vector<float> lobe;                   ///< [cells][bins] density per radian, bin averages, integral 1
+    std::vector<double> energy;                ///< [cells] scattered energy per unit incident energy
+    std::vector<double> energy_error;          ///< [cells] its standard error (0: closed form)
+    std::vector<double> standard_error;        ///< [cells] relative L2 error of the lobe
+    std::vector<double> mean_length;           ///< [cells] mean path of the scattered light inside the medium [radii]
+    std::string method;                        ///< how it was solved
+    std::uint64_t seed = 0, paths = 0;         ///< of the random methods; 0 otherwise
+    double target_error = 0, time_budget = 0;  ///< of the request (tables/request.hpp); 0: not set
 
     const Axis& axis(const std::string& name) const;
     const Axis& exit() const { return axes.back(); }

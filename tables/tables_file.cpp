@@ -101,19 +101,27 @@ void write_attribute(hid_t object, const char* name, const std::string& text, co
     check(H5Awrite(attribute, type, text.c_str()), failed);
 }
 
-void write_attribute(hid_t object, const char* name, std::uint64_t value, const std::string& where) {
-    const std::string failed = fmt::format("{}: attribute {} cannot be written", where, name);
-    const Handle space(H5Screate(H5S_SCALAR), H5Sclose, failed);
-    const Handle attribute(H5Acreate2(object, name, H5T_STD_U64LE, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, failed);
-    check(H5Awrite(attribute, H5T_NATIVE_UINT64, &value), failed);
-}
-
-struct ArrayType {
+struct NumberType {
     hid_t file, memory;
 };
 
+void write_number(hid_t object, const char* name, const NumberType& type, const void* value, const std::string& where) {
+    const std::string failed = fmt::format("{}: attribute {} cannot be written", where, name);
+    const Handle space(H5Screate(H5S_SCALAR), H5Sclose, failed);
+    const Handle attribute(H5Acreate2(object, name, type.file, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, failed);
+    check(H5Awrite(attribute, type.memory, value), failed);
+}
+
+void write_attribute(hid_t object, const char* name, std::uint64_t value, const std::string& where) {
+    write_number(object, name, {H5T_STD_U64LE, H5T_NATIVE_UINT64}, &value, where);
+}
+
+void write_attribute(hid_t object, const char* name, double value, const std::string& where) {
+    write_number(object, name, {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE}, &value, where);
+}
+
 /// Writes one array in chunks, each with a checksum, whatever the compression: no flipped bit is read silently.
-void write_array(hid_t group, const std::string& name, const std::vector<hsize_t>& shape, const ArrayType& type,
+void write_array(hid_t group, const std::string& name, const std::vector<hsize_t>& shape, const NumberType& type,
                  const void* data, Compression compression, const std::vector<hsize_t>& chunk,
                  const std::string& where) {
     const std::string failed = fmt::format("{}/{}: cannot be written", where, name);
@@ -156,8 +164,10 @@ void write_table(hid_t file, const Table& table, Compression compression, const 
     write_attribute(group, "method", table.method, where);
     write_attribute(group, "seed", table.seed, where);
     write_attribute(group, "paths", table.paths, where);
+    if (table.target_error > 0) write_attribute(group, "target_error", table.target_error, where);
+    if (table.time_budget > 0) write_attribute(group, "time_budget", table.time_budget, where);
 
-    const ArrayType real64 = {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE}, real32 = {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT};
+    const NumberType real64 = {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE}, real32 = {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT};
     std::vector<hsize_t> shape;
     for (const Axis& axis : table.axes) {
         shape.push_back(axis.size());
@@ -218,6 +228,22 @@ std::uint64_t read_whole(hid_t object, const char* name, const std::string& wher
     if (H5Tget_class(type) != H5T_INTEGER || H5Sget_simple_extent_npoints(space) != 1) throw Error("{}", failed);
     std::uint64_t value = 0;
     check(H5Aread(attribute, H5T_NATIVE_UINT64, &value), failed);
+    return value;
+}
+
+/// A positive number, 0 where there is none.
+double read_optional(hid_t object, const char* name, const std::string& where) {
+    const htri_t exists = H5Aexists(object, name);
+    if (exists == 0) return 0;
+    const std::string failed = fmt::format("{}: expected a number above 0 in attribute {}", where, name);
+    check(exists, failed);
+    const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, failed);
+    const Handle type(H5Aget_type(attribute), H5Tclose, failed);
+    const Handle space(H5Aget_space(attribute), H5Sclose, failed);
+    if (H5Tget_class(type) != H5T_FLOAT || H5Sget_simple_extent_npoints(space) != 1) throw Error("{}", failed);
+    double value = 0;
+    check(H5Aread(attribute, H5T_NATIVE_DOUBLE, &value), failed);
+    if (!(std::isfinite(value) && value > 0)) throw Error("{}, found {:g}", failed, value);
     return value;
 }
 
@@ -290,6 +316,8 @@ Table read_table(hid_t file, const std::string& name, const std::string& path) {
     table.method = read_text(group, "method", where);
     table.seed = read_whole(group, "seed", where);
     table.paths = read_whole(group, "paths", where);
+    table.target_error = read_optional(group, "target_error", where);
+    table.time_budget = read_optional(group, "time_budget", where);
     std::vector<const char*> names = {"sigma", "g"};
     if (name == "azimuthal") {
         if (H5Lexists(group, "absorption", H5P_DEFAULT) > 0) names.push_back("absorption");

@@ -58,6 +58,61 @@ class Programs(unittest.TestCase):
         self.fails(2, "furtable", "query", "t.h5", "--table", "longitudinal", "--sigma", 1, "--g", 0.3, "--h", 0.1)
         self.fails(2, "furtable", "plot", "t.h5", "-o", "x.jpg")
 
+    def test_target_error(self):
+        coarse = SMALL[:-4] + ["--progress", "none", "--json", "--target-error", "0.05"]
+        for method in ("deterministic", "mc", "analog", "auto"):
+            path = self.path(method + ".h5")
+            status, out, err = run("medulla-precompute", "-o", path, *coarse, "--method", method)
+            self.assertEqual(status, 0, err)
+            for table in json.loads(out)["tables"].values():
+                self.assertEqual(table["cells_above_target"], 0)
+                self.assertLessEqual(table["worst_standard_error"], 0.05)
+            info = json.loads(run("furtable", "info", path, "--json")[1])
+            self.assertEqual(info["tables"]["azimuthal"]["target_error"], 0.05)
+            self.assertEqual(info["tables"]["azimuthal"]["paths"], 0)
+        self.fails(2, "medulla-precompute", "--target-error", "0", names=["--target-error"])
+        self.fails(2, "medulla-precompute", "--target-error", "0.01", "--paths", "7")
+        self.fails(1, "furtable", "merge", self.path("mc.h5"), self.path("t.h5"), "-o", self.path("no.h5"))
+
+    def test_time_budget_betters_what_is_coarse(self):
+        words = SMALL[:-4] + ["--progress", "none", "--json"]
+        worst = []
+        for seconds in ("1e-9", "1.5"):
+            status, out, err = run("medulla-precompute", "-o", self.path(f"b{seconds}.h5"), *words, "--time-budget",
+                                   seconds)
+            self.assertEqual(status, 0, err)
+            worst.append(max(t["worst_standard_error"] for t in json.loads(out)["tables"].values()))
+            self.assertEqual(run("furtable", "verify", self.path(f"b{seconds}.h5"))[0], 0)
+        self.assertLess(worst[1], worst[0])
+
+    def test_scene_is_a_part_of_the_whole(self):
+        scene = self.path("scene.json")
+        with open(scene, "w") as f:
+            json.dump({"materials": [{"name": "soft", "eta": 1.6, "kappa": 0.9, "sigma_ms": 1, "g": 0.1},
+                                     {"name": "hair", "kappa": 0}]}, f)
+        words = ["--sigma-range", "0:9:12", *SMALL[2:]]
+        status, out, err = run("medulla-precompute", "--scene", scene, "--dry-run", "--json", *words)
+        self.assertEqual(status, 0, err)
+        plan = json.loads(out)
+        self.assertLess(plan["share_of_whole"], 1)
+        self.assertGreater(plan["seconds"], 0)
+        sigma = plan["tables"]["azimuthal"]["sigma"]
+        self.assertLess(sigma[1], 0.9)                             # sigma_ms kappa, and one node more
+        self.assertGreater(sigma[-2], 0.9 / math.sqrt(1 - 1 / 1.6 ** 2))
+        self.assertEqual(run("medulla-precompute", "--scene", scene, "-o", self.path("scene.h5"), *words)[0], 0)
+        self.assertEqual(run("medulla-precompute", "-o", self.path("whole.h5"), *words)[0], 0)
+        # The whole table holds the scene's cells byte for byte, so that merging them adds nothing.
+        self.assertEqual(run("furtable", "merge", self.path("scene.h5"), self.path("whole.h5"), "-o",
+                             self.path("merged.h5"))[0], 0)
+        hashes = [json.loads(run("furtable", "info", self.path(name), "--json")[1])["sha256"]
+                  for name in ("merged.h5", "whole.h5")]
+        self.assertEqual(hashes[0], hashes[1])
+        self.fails(1, "medulla-precompute", "--scene", scene, "--sigma-range", "3:9:4", names=["soft", "sigma"])
+        with open(scene, "w") as f:
+            json.dump({"materials": [{"name": "hair", "kappa": 0}]}, f)
+        self.fails(1, "medulla-precompute", "--scene", scene, names=["scene.json", "/materials"])
+        self.fails(1, "medulla-precompute", "--scene", self.path("none.json"), names=["none.json"])
+
     def test_unreadable_files_are_status_1(self):
         with open(self.path("text"), "w") as f:
             f.write("this is no table")

@@ -292,5 +292,5 @@ TEST_CASE("Workers' shards and parts of the axes merge to what one process makes
     Tables twisted = read_tables(folder / "high.h5");
     twisted.azimuthal->energy[0] += 1e-9;
     write_tables(folder / "twisted.h5", twisted, Compression::zstd);
-    CHECK(contains(complaint([&] { merge({folder / "high.h5", folder / "twisted.h5"}); }), "different slices"));
+    CHECK(contains(complaint([&] { merge({folder / "high.h5", folder / "twisted.h5"}); }), "different values"));
 }

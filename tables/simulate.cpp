@@ -1,10 +1,7 @@
 #include "tables/simulate.hpp"
 
-#include <omp.h>
-
 #include <cmath>
 #include <cstring>
-#include <exception>
 #include <mutex>
 #include <optional>
 
@@ -12,6 +9,7 @@
 #include "sim2d/disc_deterministic.hpp"
 #include "sim2d/slab_deterministic.hpp"
 #include "tables/error.hpp"
+#include "tables/parallel.hpp"
 #include "tables/schedule.hpp"
 
 namespace medulla::tables {
@@ -177,23 +175,6 @@ const Tables& SliceSolver::plan() const { return state_->plan; }
 Slice SliceSolver::solve(const SliceId& id) const {
     const double sigma = state_->request.sigma.values.at(id.sigma);
     return id.table == TableName::azimuthal ? state_->azimuthal(sigma, id.g) : state_->longitudinal(sigma, id.g);
-}
-
-void in_parallel(std::size_t count, int threads, const std::atomic<bool>& stop,
-                 const std::function<void(std::size_t)>& job) {
-    std::exception_ptr error;
-    std::atomic<bool> failed{false};
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads > 0 ? threads : omp_get_max_threads())
-    for (std::size_t i = 0; i < count; ++i) {
-        if (failed || stop) continue;
-        try {
-            job(i);
-        } catch (...) {
-#pragma omp critical
-            if (!failed.exchange(true)) error = std::current_exception();
-        }
-    }
-    if (error) std::rethrow_exception(error);
 }
 
 Tables simulate(const Request& request, ProgressMode mode) {

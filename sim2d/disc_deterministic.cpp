@@ -9,6 +9,7 @@
 #include "sim2d/disc_grid.hpp"
 #include "sim2d/disc_single.hpp"
 #include "sim2d/disc_solve.hpp"
+#include "sim2d/elementary.hpp"
 
 namespace medulla::sim2d {
 namespace {
@@ -32,9 +33,9 @@ struct Stencil {
 Stencil stencil_at(const std::vector<double>& offset, double h) {
     const std::size_t count = offset.size(), taps = std::min<std::size_t>(8, 2 * count);
     const auto beta = [&](std::ptrdiff_t t) {
-        return t < 0 ? -std::asin(offset[Stencil::chord(t)]) : std::asin(offset[Stencil::chord(t)]);
+        return t < 0 ? -portable::asin(offset[Stencil::chord(t)]) : portable::asin(offset[Stencil::chord(t)]);
     };
-    const double x = std::asin(std::abs(h));
+    const double x = portable::asin(std::abs(h));
     const auto above = std::upper_bound(offset.begin(), offset.end(), std::abs(h)) - offset.begin();
     Stencil s;
     s.start = std::min<std::ptrdiff_t>(above - static_cast<std::ptrdiff_t>(taps / 2),
@@ -78,13 +79,15 @@ Light at_offset(const DiscExit& exit, double h) {
 void add_modes(const std::vector<Complex>& c, std::vector<double>& lobe) {
     const std::size_t bins = lobe.size(), turn = 2 * bins;
     std::vector<double> cosine(turn), sine(turn);
-    for (std::size_t a = 0; a < turn; ++a) {
-        cosine[a] = std::cos(pi * static_cast<double>(a) / static_cast<double>(bins));
-        sine[a] = std::sin(pi * static_cast<double>(a) / static_cast<double>(bins));
+    for (std::size_t a = 0; a <= bins; ++a) {
+        const double angle = pi * static_cast<double>(a) / static_cast<double>(bins);
+        cosine[a] = cosine[(turn - a) % turn] = portable::cos(angle);
+        sine[(turn - a) % turn] = -portable::sin(angle);
+        sine[a] = portable::sin(angle);
     }
     for (std::size_t k = 0; k < c.size(); ++k) {
         const double half = pi * static_cast<double>(k) / static_cast<double>(bins);
-        const Complex value = k == 0 ? c[0] : c[k] * (2 * std::sin(half) / half * (k % 2 ? -1 : 1));
+        const Complex value = k == 0 ? c[0] : c[k] * (2 * sine[k % turn] / half * (k % 2 ? -1 : 1));
         // phi = -pi + (2 b + 1) pi / bins; exp(-i k pi) is in the factor above.
         std::size_t angle = k % turn;
         for (double& x : lobe) {
@@ -98,14 +101,15 @@ void add_modes(const std::vector<Complex>& c, std::vector<double>& lobe) {
 /// Scattering makes the source under the rim behave like z log z over a depth z = rim^2 / 2; light that is scattered
 /// twice carries modes of g^(2 k).
 DiscGridSize automatic(double sigma, double sigma_a, double g, const DiscOptions& options) {
-    const double scale = std::cbrt(options.target_error / 1e-3), depth = std::min(sigma + sigma_a, 40.0);
+    const double scale = portable::exp(portable::log(options.target_error / 1e-3) / 3),
+                 depth = std::min(sigma + sigma_a, 40.0);
     DiscGridSize size;
     size.circles = options.circles > 0 ? options.circles : static_cast<int>(std::ceil((8 + depth) / scale));
     size.gap = options.gap > 0 ? options.gap : std::min(0.3 * scale, 0.4);
     size.rim = options.rim > 0 ? options.rim : 0.003 * scale * std::sqrt(16 / std::clamp(depth, 1.0, 16.0));
-    size.growth = 1 + scale * (0.17 + 0.13 * std::exp(-depth / 4));
+    size.growth = 1 + scale * (0.17 + 0.13 * portable::exp(-depth / 4));
     const double visible = 0.6 * options.target_error / std::min(sigma, 1.0);
-    const double tail = g == 0 || visible >= 1 ? 0 : std::log(visible) / (2 * std::log(std::abs(g)));
+    const double tail = g == 0 || visible >= 1 ? 0 : portable::log(visible) / (2 * portable::log(std::abs(g)));
     // Near the tangent the lobe has a kink at phi = 0, softened by g only: algebraic in the modes.
     const double kink =
         (19 + 5 * std::min(std::sqrt(depth), 8.0)) * (1 + std::max(0.0, 3 * std::abs(g) - 1.5)) / std::max(scale, 0.5);
@@ -130,7 +134,7 @@ const double share = 1 / (coarsening * coarsening * coarsening - 1);
 double mean_first_flight(double extinction, double length) {
     const double tau = extinction * length;
     if (tau < 0.3) return length * (0.5 - tau / 12 * (1 - tau * tau / 60 * (1 - tau * tau / 42)));
-    return length * (1 / tau - 1 / std::expm1(tau));
+    return length * (1 / tau - 1 / portable::expm1(tau));
 }
 
 }  // namespace

@@ -127,7 +127,12 @@ void run_diff(const DiffWords& words) {
         candidate->check(kind, low, words.b);
         candidate->check(kind, high, words.b);
     }
-    const std::vector<LobeError> errors = compare(*reference, *candidate);
+    std::vector<LobeError> errors;
+    try {
+        errors = compare(*reference, *candidate);
+    } catch (const Error& error) {
+        throw Error("{} and {}: {}", words.a, words.b, error.what());
+    }
     if (errors.empty()) throw Error("{} and {}: expected a table that both have, found none", words.a, words.b);
     if (words.json)
         fmt::print("{}\n", nlohmann::ordered_json{{"errors", to_json(errors)}}.dump());

@@ -9,6 +9,7 @@
 
 #include "tables/budget.hpp"
 #include "tables/error.hpp"
+#include "tables/parallel.hpp"
 #include "tables/program.hpp"
 
 namespace medulla::tables {
@@ -125,6 +126,8 @@ Tables assemble(const ShardFolder& folder, const Tables& plan) {
 
 JobReport run_job(const Job& job) {
     const Interrupts interrupts;
+    if (std::filesystem::is_directory(job.output))
+        throw Error("{}: expected the name of a file, found a folder", job.output);
     const SliceSolver solver(job.request);
     const Tables& plan = solver.plan();
     ShardFolder folder(ShardFolder::beside(job.output), plan);

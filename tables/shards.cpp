@@ -11,10 +11,10 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "tables/error.hpp"
 #include "tables/file.hpp"
+#include "tables/json_text.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -253,7 +253,8 @@ Tables read_configuration(const std::string& folder) {
     const std::vector<unsigned char> bytes = read_file(path, greatest_configuration);
     Tables plan;
     try {
-        const auto json = nlohmann::ordered_json::parse(bytes.begin(), bytes.end());
+        const auto* text = reinterpret_cast<const char*>(bytes.data());
+        const auto json = parse_json<nlohmann::ordered_json>(text, text + bytes.size(), path);
         plan.program = json.at("program").get<std::string>();
         const auto& tables = json.at("tables");
         if (tables.contains("azimuthal"))

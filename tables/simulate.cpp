@@ -1,10 +1,7 @@
 #include "tables/simulate.hpp"
 
-#include <omp.h>
-
 #include <cmath>
 #include <cstring>
-#include <exception>
 #include <mutex>
 #include <optional>
 
@@ -13,6 +10,7 @@
 #include "sim2d/slab_deterministic.hpp"
 #include "sim2d/tracer.hpp"
 #include "tables/error.hpp"
+#include "tables/parallel.hpp"
 #include "tables/schedule.hpp"
 
 namespace medulla::tables {
@@ -255,23 +253,6 @@ Slice SliceSolver::solve(const SliceId& id) const { return solve(id, state_->req
 Slice SliceSolver::solve(const SliceId& id, double target_error) const {
     return id.table == TableName::azimuthal ? state_->azimuthal(id, target_error)
                                             : state_->longitudinal(id, target_error);
-}
-
-void in_parallel(std::size_t count, int threads, const std::atomic<bool>& stop,
-                 const std::function<void(std::size_t)>& job) {
-    std::exception_ptr error;
-    std::atomic<bool> failed{false};
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads > 0 ? threads : omp_get_max_threads())
-    for (std::size_t i = 0; i < count; ++i) {
-        if (failed || stop) continue;
-        try {
-            job(i);
-        } catch (...) {
-#pragma omp critical
-            if (!failed.exchange(true)) error = std::current_exception();
-        }
-    }
-    if (error) std::rethrow_exception(error);
 }
 
 Tables simulate(const Request& request, ProgressMode mode) {

@@ -2,8 +2,6 @@
 // alone, not on other slices, threads or timing.
 #pragma once
 
-#include <atomic>
-#include <functional>
 #include <memory>
 
 #include "tables/progress.hpp"
@@ -32,11 +30,6 @@ class SliceSolver {
     struct State;
     std::unique_ptr<State> state_;
 };
-
-/// Runs `job(i)` for i = 0 .. count - 1 on `threads` threads (0: all), taking no more once `stop` is set or a job has
-/// thrown; rethrows the first error.
-void in_parallel(std::size_t count, int threads, const std::atomic<bool>& stop,
-                 const std::function<void(std::size_t)>& job);
 
 /// Simulates the tables of a request in memory.
 Tables simulate(const Request& request, ProgressMode progress);

@@ -9,6 +9,7 @@
 #include "medulla/lookup.hpp"
 #include "tables/error.hpp"
 #include "tables/file.hpp"
+#include "tables/parallel.hpp"
 #include "tables/spline.hpp"
 #include "tables/tables_file.hpp"
 
@@ -101,6 +102,9 @@ class TableSource : public Source {
     std::map<std::string, Spline> splines_;
 };
 
+/// Of a pack: as many nodes on an axis as a tables file may have, and lobes that a program can list.
+constexpr std::uint32_t most_nodes = 4096, most_lobes = 10000000;
+
 /// Lobes of a pack through the runtime's own contraction.
 class PackSource : public Source {
   public:
@@ -108,6 +112,8 @@ class PackSource : public Source {
         const OpenResult opened = open_pack(bytes_.data(), bytes_.size());
         if (opened.status != PackStatus::ok) throw Error("{}: expected a pack: {}", path, describe(opened.status));
         pack_ = opened.pack;
+        for (const TableView& table : pack_.tables)
+            if (table) check_nodes(table, path);
     }
 
     bool has(TableKind kind) const override { return static_cast<bool>(pack_[kind]); }
@@ -164,6 +170,21 @@ class PackSource : public Source {
     }
 
   private:
+    /// Nodes are for information: nothing in the pack bounds them, but programs make one lobe of each.
+    static void check_nodes(const TableView& table, const std::string& path) {
+        double lobes = 1;
+        for (std::uint32_t k = 0; k < table.layout.axis_count; ++k) {
+            const std::uint32_t nodes = table.layout.axes[k].nodes;
+            if (nodes < 1 || nodes > most_nodes)
+                throw Error("{}: {}: expected 1 to {} nodes on an axis, found {}", path,
+                            name_of(static_cast<TableKind>(table.layout.kind)), most_nodes, nodes);
+            if (k < table.parameter_axes()) lobes *= nodes;
+        }
+        if (lobes > most_lobes)
+            throw Error("{}: {}: expected at most {} lobes, found {:g}", path,
+                        name_of(static_cast<TableKind>(table.layout.kind)), most_lobes, lobes);
+    }
+
     struct Point {
         std::uint32_t span;
         bool negative;
@@ -299,8 +320,8 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
                 at.set(axes[k].name, axes[k].values[index % axes[k].size()]);
             return at;
         };
-#pragma omp parallel for schedule(static)
-        for (std::size_t i = 0; i < error.lobes; ++i) {
+        const std::atomic<bool> never{false};
+        in_parallel(error.lobes, 0, never, [&](std::size_t i) {
             const Parameters at = parameters(i);
             const std::vector<double> a = reference.lobe(kind, at, bins);
             std::vector<double> b = candidate.lobe(kind, at, bins);
@@ -312,14 +333,14 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
                 b[j] -= a[j];
             }
             norm[i] = norm2(a), misfit[i] = norm2(b), energy[i] = std::abs(sum * width - 1), least[i] = low;
-        }
+        });
         double total = 0, total_misfit = 0;
         error.least = least[0];
         std::size_t worst = 0;
         for (std::size_t i = 0; i < error.lobes; ++i) {
             total += norm[i];
             total_misfit += misfit[i];
-            error.energy = std::max(error.energy, energy[i]);
+            error.energy = std::isnan(energy[i]) ? energy[i] : std::max(error.energy, energy[i]);  // a NaN stays
             error.least = std::min(error.least, least[i]);
             if (misfit[i] * norm[worst] > misfit[worst] * norm[i]) worst = i;
         }

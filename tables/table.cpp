@@ -70,6 +70,37 @@ std::optional<double> closed_form_energy(const Table& table, std::size_t cell) {
     return azimuthal_energy(table.parameter(cell, "sigma"), table.parameter(cell, "h"));
 }
 
+void check_cells(const Table& table, const std::string& where) {
+    const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
+    const double width = bin_width(table.exit());
+    for (std::size_t cell = 0; cell < table.cells(); ++cell) {
+        const auto fail = [&](const std::string& what) {
+            throw Error("{}: {}: {}", where, table.describe(cell), what);
+        };
+        double sum = 0;
+        for (std::size_t b = 0; b < table.bins(); ++b) {
+            const auto value = static_cast<double>(table.lobe_of(cell)[b]);
+            if (!(value >= 0)) fail(fmt::format("expected a density >= 0, found {:g}", value));
+            sum += value * width;
+        }
+        // Sums of float values: each is rounded by 2^-24 relative.
+        if (!(std::abs(sum - 1) <= 1e-6)) fail(fmt::format("expected a lobe of integral 1, found {:.9g}", sum));
+        for (const auto* array : {&table.energy, &table.energy_error, &table.standard_error, &table.mean_length})
+            if (!((*array)[cell] >= 0))
+                fail(fmt::format("expected an energy, errors and a length >= 0, found {:g}", (*array)[cell]));
+        if (cell % sides != 0) continue;
+        double energy = 0, variance = 0;
+        for (std::size_t s = 0; s < sides; ++s) {
+            energy += table.energy[cell + s];
+            variance += table.energy_error[cell + s] * table.energy_error[cell + s];
+        }
+        const std::optional<double> expected = closed_form_energy(table, cell);
+        if (!(energy <= 1 + 1e-12) || (expected && !(std::abs(energy - *expected) <= 5 * std::sqrt(variance) + 1e-12)))
+            fail(fmt::format("expected energy {:.9g}, found {:.9g} with standard error {:.2e}", expected.value_or(1),
+                             energy, std::sqrt(variance)));
+    }
+}
+
 std::vector<double> side_lobes(const Table& table, std::size_t side) {
     const std::size_t bins = table.bins(), sides = table.name == "longitudinal" ? 2 : 1;
     const std::size_t n = table.cells() / sides;

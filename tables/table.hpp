@@ -50,6 +50,10 @@ struct Tables {
 /// Scattered energy of a cell in closed form (both sides together for the slab); no value with an absorption axis.
 std::optional<double> closed_form_energy(const Table& table, std::size_t cell);
 
+/// Throws Error that begins with `where` unless every lobe is a density (>= 0, integral 1), every energy what is
+/// scattered in closed form (within five standard errors; in [0, 1] where there is none), every error and length >= 0.
+void check_cells(const Table& table, const std::string& where);
+
 /// Lobe of one side of a longitudinal table, or the azimuthal table, as an array [cells of that side][bins].
 std::vector<double> side_lobes(const Table& table, std::size_t side);
 

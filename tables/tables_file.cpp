@@ -265,6 +265,7 @@ void check_storage(hid_t set, hid_t type, const std::vector<hsize_t>& shape, con
         if (chunk[k] < 1 || chunk[k] > shape[k])
             throw Error("{}: expected chunks within shape {}, found {}", where, shape_text(shape), shape_text(chunk));
     const int filters = H5Pget_nfilters(properties);
+    int compressors = 0;
     for (int i = 0; i < filters; ++i) {
         unsigned flags = 0, config = 0;
         std::size_t count = 0;
@@ -272,6 +273,9 @@ void check_storage(hid_t set, hid_t type, const std::vector<hsize_t>& shape, con
             H5Pget_filter2(properties, static_cast<unsigned>(i), &flags, &count, nullptr, 0, nullptr, &config);
         if (id != H5Z_FILTER_SHUFFLE && id != H5Z_FILTER_DEFLATE && id != H5Z_FILTER_FLETCHER32 && id != zstd_filter_id)
             throw Error("{}: expected shuffle, gzip, zstd and Fletcher-32 filters, found filter {}", where, id);
+        // One after another they would multiply how far few bytes expand: gzip alone 1032 times, zstd to one chunk.
+        compressors += id == H5Z_FILTER_DEFLATE || id == zstd_filter_id;
+        if (compressors > 1) throw Error("{}: expected one compression, found several", where);
     }
 }
 
@@ -342,6 +346,7 @@ Table read_table(hid_t file, const std::string& name, const std::string& path) {
     table.energy_error = read_array<double>(group, "energy_error", H5T_NATIVE_DOUBLE, cells, where);
     table.standard_error = read_array<double>(group, "standard_error", H5T_NATIVE_DOUBLE, cells, where);
     table.mean_length = read_array<double>(group, "mean_length", H5T_NATIVE_DOUBLE, cells, where, true);
+    check_cells(table, where);
     return table;
 }
 
@@ -351,6 +356,8 @@ void write_tables(const std::string& path, const Tables& tables, Compression com
                   const std::string& temporary) {
     quiet();
     register_zstd_filter();
+    // Nothing is written that would be refused when it is read.
+    for (const Table* table : tables.present()) check_cells(*table, fmt::format("{}: /{}", path, table->name));
     // The file is made in memory and written by us: HDF5 closes a file on a full disk without a word.
     PendingFile pending(path, temporary);
     Image image;

@@ -16,6 +16,10 @@ inline constexpr std::uint32_t pack_version = 3;
 inline constexpr std::uint32_t max_rank = 512;
 inline constexpr std::uint32_t max_axes = 6;
 inline constexpr std::uint32_t max_spans = 4096;
+/// Sum over components of |scale| times the greatest number in every axis: what a value can reach. Over the least
+/// integral that lookup.hpp divides by, 1e-30, that is a finite float: no pack makes an infinity or a NaN. The pack
+/// built in reaches 1540.
+inline constexpr float most_reach = 1e7f;
 inline constexpr std::uint32_t rank_multiple = 8;  ///< rows are padded with zeros to a multiple of this rank
 
 MEDULLA_FN constexpr std::uint32_t padded_rank(std::uint32_t rank) noexcept {
@@ -167,7 +171,7 @@ inline const char* describe(PackStatus status) noexcept {
         case PackStatus::bad_knots:
             return "an axis's knots do not increase, or do not span its range";
         case PackStatus::bad_number:
-            return "a scale or integral is not finite";
+            return "a scale or integral is not finite, or its lobes could exceed any density";
         case PackStatus::out_of_bounds:
             return "an offset points outside the pack";
     }
@@ -261,12 +265,17 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
         if (!half_circle(view.axis(k), quantity)) return PackStatus::bad_knots;
     }
     const std::uint32_t offsets[2] = {table.scales_offset, table.integrals_offset};
+    float sum[2] = {0, 0};
     for (std::uint32_t i = 0; i < (view.has_exit() ? 2u : 1u); ++i) {
         if (!inside(offsets[i], std::uint64_t(table.rank_stride) * 4, total)) return PackStatus::out_of_bounds;
-        for (std::uint32_t r = 0; r < table.rank_stride; ++r)
-            if (!finite(load<float>(view.bytes + offsets[i] + 4 * r))) return PackStatus::bad_number;
+        for (std::uint32_t r = 0; r < table.rank_stride; ++r) {
+            const float value = load<float>(view.bytes + offsets[i] + 4 * r);
+            if (!finite(value)) return PackStatus::bad_number;
+            sum[i] += std::abs(value);
+        }
     }
-    return PackStatus::ok;
+    for (std::uint32_t k = 0; k < table.axis_count; ++k) sum[0] *= float(greatest_number);
+    return sum[0] <= most_reach ? PackStatus::ok : PackStatus::bad_number;
 }
 
 }  // namespace detail

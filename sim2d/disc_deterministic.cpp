@@ -53,7 +53,7 @@ Stencil stencil_at(const std::vector<double>& offset, double h) {
 /// What leaves at the offset h, over the energy of the first collisions: I(-b, -phi) = I(b, phi).
 struct Light {
     std::vector<Complex> c;
-    double rest = 0;  ///< mean path after the first collision
+    double rest = 0, length = 0;  ///< see DiscExit
 };
 
 Light at_offset(const DiscExit& exit, double h) {
@@ -64,6 +64,7 @@ Light at_offset(const DiscExit& exit, double h) {
         const std::ptrdiff_t t = stencil.start + static_cast<std::ptrdiff_t>(a);
         const std::size_t chord = Stencil::chord(t);
         light.rest += stencil.weight[a] * exit.rest[chord];
+        light.length += stencil.weight[a] * exit.length[chord];
         for (std::size_t k = 0; k < exit.modes; ++k) {
             const Complex value = exit.lobes[chord * exit.modes + k];
             light.c[k] += stencil.weight[a] * (t < 0 ? std::conj(value) : value);
@@ -182,7 +183,7 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
         const auto [integral, fraction] = leaves(light);
         profile.energy = collided * fraction;
         profile.energy_error = std::abs(integral - (1 - sigma_a * light.rest)) * collided;
-        if (sigma_a == 0) profile.mean_length = mean_first_flight(sigma, chord) + light.rest;
+        profile.mean_length = (mean_first_flight(extinction, chord) + light.length) / fraction;
         add_modes(light.c, profile.lobe);
         if (two_grids) {
             Light difference = at_offset(coarse, offset);

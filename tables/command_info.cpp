@@ -121,6 +121,25 @@ double asymmetry(const std::vector<double>& lobe) {
     return std::sqrt(difference / norm);
 }
 
+/// A cell in a medium that absorbs: no more than its first collisions leave unabsorbed, no more than at the absorption
+/// before.
+template <class Fail>
+void verify_absorbed(const Table& table, std::size_t cell, const Fail& fail) {
+    const double sigma = table.parameter(cell, "sigma"), a = table.parameter(cell, "absorption"),
+                 most = sigma / (sigma + a) * azimuthal_energy(sigma + a, table.parameter(cell, "h"));
+    const double energy = table.energy[cell], error = table.energy_error[cell];
+    if (!(energy >= 0 && energy <= most + 5 * error + 1e-12))
+        fail(fmt::format("expected an energy of at most {:.9g}, found {:.9g} with standard error {:.2e}", most, energy,
+                         error));
+    const std::size_t step = table.axis("h").size(), along = table.position(cell)[2];
+    if (along == 0) return;
+    const double before = table.energy[cell - step], noise = std::hypot(error, table.energy_error[cell - step]);
+    if (energy > before + 5 * noise + 1e-12)
+        fail(fmt::format(
+            "expected at most the energy {:.9g} of less absorption, found {:.9g} with standard error {:.2e}", before,
+            energy, noise));
+}
+
 /// Every cell of a table: integral, sign, energy against the closed form, mirror symmetry where the light is head-on.
 void verify_table(const Table& table, const std::string& path) {
     const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
@@ -145,7 +164,10 @@ void verify_table(const Table& table, const std::string& path) {
                              asymmetry(lobe), noise));
         if (cell % sides != 0) continue;
         const std::optional<double> expected = closed_form_energy(table, cell);
-        if (!expected) continue;
+        if (!expected) {
+            verify_absorbed(table, cell, fail);
+            continue;
+        }
         double energy = 0, variance = 0;
         for (std::size_t s = 0; s < sides; ++s) {
             energy += table.energy[cell + s];
@@ -161,6 +183,27 @@ struct PackBalance {
     double least = 0, energy = 0;
 };
 
+/// Absorption leaves all at 0 and less and less beyond it, at every node.
+void verify_survival(const Source& pack, const std::string& path) {
+    const std::vector<Axis> axes = pack.parameter_axes(TableKind::azimuthal);  // sigma, g, absorption, h
+    for (const double sigma : axes[0].values)
+        for (const double g : axes[1].values)
+            for (const double h : axes[3].values) {
+                double before = 1;
+                for (const double a : axes[2].values) {
+                    Parameters at;
+                    at.sigma = sigma, at.g = g, at.absorption = a, at.h = h;
+                    const double left = pack.survival(at);
+                    if (!(left > 0 && (a == 0 ? left == 1 : left < before)))
+                        throw Error(
+                            "{}: sigma {:g}, g {:g}, absorption {:g}, h {:g}: expected less to be left than {:g}, "
+                            "found {:g}",
+                            path, sigma, g, a, h, before, left);
+                    before = left;
+                }
+            }
+}
+
 /// Every node of a pack: finite, >= 0, integral 1 but for what holding at 0 adds.
 PackBalance verify_pack(const Source& pack, const std::string& path) {
     PackBalance range;
@@ -171,6 +214,7 @@ PackBalance verify_pack(const Source& pack, const std::string& path) {
         range.energy = std::max(range.energy, error.energy);
         range.least = std::min(range.least, error.least);
     }
+    if (pack.absorbs()) verify_survival(pack, path);
     // A lobe is normalised before its dips below 0 are held there, so its integral exceeds 1 by what they hold. At half
     // of its energy the factors are no densities at all.
     if (range.energy > 0.5)

@@ -110,6 +110,8 @@ Tables plan_of(const Request& request) {
         plan.azimuthal.emplace();
         plan.azimuthal->name = "azimuthal";
         plan.azimuthal->axes = {request.sigma, request.g, request.h, exit_axis("phi", request.bins)};
+        if (request.absorption.size() > 0)
+            plan.azimuthal->axes.insert(plan.azimuthal->axes.begin() + 2, request.absorption);
         begin(*plan.azimuthal, request);
     }
     if (request.longitudinal) {
@@ -134,18 +136,32 @@ struct SliceSolver::State {
     Slice azimuthal(double sigma, std::size_t ig) const {
         const std::vector<double>& offsets = request.h.values;
         const double g = request.g.values[ig];
-        Slice slice(offsets.size(), request.bins);
-        std::vector<sim2d::Profile> solved(offsets.size());
-        if (solves(request)) solved = discs.at(ig).solve(sigma, offsets, request.bins);
-        for (std::size_t i = 0; i < offsets.size(); ++i) {
+        // Without an axis of absorption: none. Cells are [absorption][h].
+        const std::vector<double> absorption =
+            request.absorption.size() > 0 ? request.absorption.values : std::vector<double>{0.0};
+        const std::size_t count = offsets.size();
+        Slice slice(absorption.size() * count, request.bins);
+        std::vector<sim2d::Profile> solved;
+        for (std::size_t j = 0; solves(request) && j < absorption.size(); ++j)
+            for (sim2d::Profile& profile : discs.at(ig).solve(sigma, absorption[j], offsets, request.bins))
+                solved.push_back(std::move(profile));
+        solved.resize(slice.cells);
+        for (std::size_t i = 0; i < count; ++i) {
             const double h = offsets[i];
-            if (wants_paths(request, solved[i])) {
-                sim2d::Profile traced =
-                    sim2d::trace_disc(sigma, g, h, request.bins, trace_options(request, cell_key(0, {sigma, g, h})));
-                if (!solves(request) || traced.standard_error < solved[i].standard_error) solved[i] = std::move(traced);
+            bool wanted = false;
+            for (std::size_t j = 0; j < absorption.size(); ++j)
+                wanted = wanted || wants_paths(request, solved[j * count + i]);
+            if (!wanted) continue;
+            std::vector<sim2d::Profile> traced = sim2d::trace_disc(sigma, g, h, absorption, request.bins,
+                                                                   trace_options(request, cell_key(0, {sigma, g, h})));
+            for (std::size_t j = 0; j < absorption.size(); ++j) {
+                sim2d::Profile& profile = solved[j * count + i];
+                if (!wants_paths(request, profile)) continue;
+                if (!solves(request) || traced[j].standard_error < profile.standard_error)
+                    profile = std::move(traced[j]);
             }
-            store(slice, i, solved[i]);
         }
+        for (std::size_t cell = 0; cell < slice.cells; ++cell) store(slice, cell, solved[cell]);
         return slice;
     }
 

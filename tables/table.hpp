@@ -25,6 +25,7 @@ struct Table {
     std::uint64_t seed = 0, paths = 0;   ///< of the random methods; 0 otherwise
 
     const Axis& axis(const std::string& name) const;
+    bool has_axis(const std::string& name) const;
     const Axis& exit() const { return axes.back(); }
     std::size_t bins() const { return exit().size(); }
     std::size_t cells() const;
@@ -46,8 +47,17 @@ struct Tables {
     std::vector<const Table*> present() const;
 };
 
-/// Scattered energy of a cell in closed form (both sides together for the slab); no value with an absorption axis.
+/// Scattered energy of a cell in closed form (both sides together for the slab); no value where light is absorbed.
 std::optional<double> closed_form_energy(const Table& table, std::size_t cell);
+
+/// Where a table has an axis of absorption a: for each cell the length l by which exp(-a l) of the light that is
+/// scattered without absorption is left, -log(energy / E) / a, E in closed form; at a = 0 the mean length, its limit.
+/// Where E = 0, l over the mean length is extrapolated: the parabola through the next three nodes, in sigma or in
+/// sqrt(1 - h^2). Throws Error where a cell has no energy or no mean length. Without such an axis: empty.
+std::vector<double> survival_lengths(const Table& azimuthal);
+
+/// The polynomial through (x, y) at another place.
+double extrapolate(const std::vector<double>& x, const std::vector<double>& y, double to);
 
 /// Lobe of one side of a longitudinal table, or the azimuthal table, as an array [cells of that side][bins].
 std::vector<double> side_lobes(const Table& table, std::size_t side);

@@ -242,6 +242,7 @@ Request small_request() {
     request.g = graded_axis("g", {0, 0.6, 2});
     request.h = graded_axis("h", {0, 1, 3});
     request.theta_i = graded_axis("theta_i", {0, 1.2, 2});
+    request.absorption = graded_axis("absorption", {0, 1, 2});
     request.bins = 36;
     request.paths = 500;
     request.method = Method::analog;
@@ -272,6 +273,7 @@ float ask(const PackView& pack, Random& random) {
     const float sigmas[] = {0, 0.3f, 2, 16, -1, 1e30f}, gs[] = {0, 0.5f, 0.95f, -1}, hs[] = {0, 0.7f, 1, -0.3f};
     const float sigma = sigmas[random() % 6], g = gs[random() % 4], h = hs[random() % 4];
     float sum = azimuthal(pack, sigma, g, h, 1.0f);
+    for (const float absorption : {0.7f, 30.0f, -1.0f}) sum += azimuthal(pack, sigma, g, h, 1.0f, absorption);
     for (const Side side : {Side::back, Side::forward}) sum += longitudinal(pack, side, sigma, g, h, 0.3f);
     for (const TableView& table : pack.tables) {
         if (!table || !table.has_exit()) continue;

@@ -54,7 +54,7 @@ Stencil stencil_at(const std::vector<double>& offset, double h) {
 /// What leaves at the offset h, over the energy of the first collisions: I(-b, -phi) = I(b, phi).
 struct Light {
     std::vector<Complex> c;
-    double rest = 0;  ///< mean path after the first collision
+    double rest = 0, length = 0;  ///< see DiscExit
 };
 
 Light at_offset(const DiscExit& exit, double h) {
@@ -65,6 +65,7 @@ Light at_offset(const DiscExit& exit, double h) {
         const std::ptrdiff_t t = stencil.start + static_cast<std::ptrdiff_t>(a);
         const std::size_t chord = Stencil::chord(t);
         light.rest += stencil.weight[a] * exit.rest[chord];
+        light.length += stencil.weight[a] * exit.length[chord];
         for (std::size_t k = 0; k < exit.modes; ++k) {
             const Complex value = exit.lobes[chord * exit.modes + k];
             light.c[k] += stencil.weight[a] * (t < 0 ? std::conj(value) : value);
@@ -130,6 +131,13 @@ DiscGridSize coarser(const DiscGridSize& size) {
 /// difference of the two.
 const double share = 1 / (coarsening * coarsening * coarsening - 1);
 
+/// Of a lobe's bin averages over the circle.
+double integral(const std::vector<double>& lobe) {
+    double sum = 0;
+    for (const double x : lobe) sum += x * (2 * pi / static_cast<double>(lobe.size()));
+    return sum;
+}
+
 /// Mean of t over the first collisions exp(-extinction t) on a chord: length (1 / tau - 1 / (exp(tau) - 1)).
 double mean_first_flight(double extinction, double length) {
     const double tau = extinction * length;
@@ -160,7 +168,6 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
     for (const double offset : h) require(offset >= -1 && offset <= 1, "h: expected a value in [-1, 1]");
     const double extinction = sigma + sigma_a;
     const DiscGridSize size = automatic(sigma, sigma_a, g_, options_);
-    const double width = 2 * pi / static_cast<double>(bins);
     // Everything is divided by the energy of the first collisions, so a limit sigma -> 0 is a solve at a sigma that
     // adds nothing to it in double precision.
     const double visible = std::max(sigma, 1e-30), tolerance = 0.02 * std::min(options_.target_error, 1e-3);
@@ -174,8 +181,10 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
         const double chord = 2 * std::sqrt((1 - offset) * (1 + offset));
         const double collided = sigma > 0 ? disc_energy(extinction, offset) * (sigma / extinction) : 0;
         profile.lobe = disc_single_lobe(extinction, g_, offset, bins);
-        double single = 0;
-        for (const double x : profile.lobe) single += x * width;
+        // Few bins are too coarse a rule for what leaves; without absorption nothing but energy_error rests on it.
+        const std::size_t points = sigma_a > 0 ? std::max<std::size_t>(bins, 180) : bins;
+        const double single =
+            points == bins ? integral(profile.lobe) : integral(disc_single_lobe(extinction, g_, offset, points));
         const Light light = at_offset(fine, offset);
         // The fraction of collided light that leaves, twice: as integral of the lobe, and as what is not absorbed on
         // the way. Each is used where it keeps its digits.
@@ -183,10 +192,10 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
             const double lobe = single + 2 * pi * l.c[0].real(), path = 1 - sigma_a * l.rest;
             return std::pair{lobe, path * path + (1 - path) * lobe};
         };
-        const auto [integral, fraction] = leaves(light);
+        const auto [whole, fraction] = leaves(light);
         profile.energy = collided * fraction;
-        profile.energy_error = std::abs(integral - (1 - sigma_a * light.rest)) * collided;
-        if (sigma_a == 0) profile.mean_length = mean_first_flight(sigma, chord) + light.rest;
+        profile.energy_error = std::abs(whole - (1 - sigma_a * light.rest)) * collided;
+        profile.mean_length = (mean_first_flight(extinction, chord) + light.length) / fraction;
         add_modes(light.c, profile.lobe);
         if (two_grids) {
             Light difference = at_offset(coarse, offset);
@@ -202,8 +211,7 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
             }
             profile.standard_error = share * std::sqrt(error / square) + (sigma > 0 ? fine.residual : 0);
         }
-        double sum = 0;
-        for (const double x : profile.lobe) sum += x * width;
+        const double sum = integral(profile.lobe);
         for (double& x : profile.lobe) x /= sum;
         profiles.push_back(std::move(profile));
     }

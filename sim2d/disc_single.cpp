@@ -36,8 +36,9 @@ Collisions first_collision(double sigma, double h) {
     return c;
 }
 
-/// Mean of exp(-sigma d) over the first collision; d = distance to the circle along phi.
-double escape(const Collisions& c, double sigma, double h, double phi) {
+/// Mean over the first collision of value(place on the chord, distance d to the circle along phi).
+template <class Value>
+double mean_over(const Collisions& c, double h, double phi, Value&& value) {
     const double cosine = portable::cos(phi), sine = portable::sin(phi), half2 = (1 - h) * (1 + h);
     double sum = 0;
     for (std::size_t i = 0; i < c.x.size(); ++i) {
@@ -45,9 +46,22 @@ double escape(const Collisions& c, double sigma, double h, double phi) {
         const double inside = std::max(0.0, half2 - c.x[i] * c.x[i]);  // 1 - r^2
         const double root = std::sqrt(along * along + inside);
         const double d = along > 0 ? (root + along > 0 ? inside / (root + along) : 0.0) : root - along;
-        sum += c.weight[i] * portable::exp(-sigma * d);
+        sum += c.weight[i] * value(c.x[i], d);
     }
     return sum;
+}
+
+double escape(const Collisions& c, double sigma, double h, double phi) {
+    return mean_over(c, h, phi, [&](double, double d) { return portable::exp(-sigma * d); });
+}
+
+/// Gauss points for the integral over phi of p times a smooth function, in a bin of this width. The integrand's nearest
+/// singularity is the pole of p, -log|g| off the axis: r points converge like rho^-2r, rho = (pole + sqrt(pole^2 + 1))
+/// in units of half a bin. 2 points at least; aim at 1e-8.
+GaussRule rule_for(double g, double width) {
+    const double pole = g == 0 ? 100 : std::min(100.0, -portable::log(std::abs(g)) * 2 / width);
+    const double rho = pole + std::sqrt(pole * pole + 1);
+    return unit_gauss_rule(std::clamp(static_cast<int>(std::ceil(9.2 / portable::log(rho))), 2, 64));
 }
 
 }  // namespace
@@ -60,12 +74,7 @@ double disc_single_over_energy(double sigma, double g, double h, double phi) {
 
 std::vector<double> disc_single_lobe(double sigma, double g, double h, std::size_t bins) {
     const double width = 2 * pi / static_cast<double>(bins);
-    // The integrand's nearest singularity is the pole of p, -log|g| off the axis: r points converge like
-    // rho^-2r, rho = (pole + sqrt(pole^2 + 1)) in units of half a bin. 2 points at least; aim at 1e-8.
-    const double pole = g == 0 ? 100 : std::min(100.0, -portable::log(std::abs(g)) * 2 / width);
-    const double rho = pole + std::sqrt(pole * pole + 1);
-    const int count = std::clamp(static_cast<int>(std::ceil(9.2 / portable::log(rho))), 2, 64);
-    const GaussRule rule = unit_gauss_rule(count);
+    const GaussRule rule = rule_for(g, width);
     const Collisions collisions = first_collision(sigma, h);
     std::vector<double> lobe(bins);
     for (std::size_t b = 0; b < bins; ++b) {
@@ -78,6 +87,22 @@ std::vector<double> disc_single_lobe(double sigma, double g, double h, std::size
         lobe[b] = sum;
     }
     return lobe;
+}
+
+double disc_single_length(double sigma, double g, double h) {
+    const int bins = 180;
+    const double width = 2 * pi / bins, half = half_chord(h);
+    const GaussRule rule = rule_for(g, width);
+    const Collisions collisions = first_collision(sigma, h);
+    double sum = 0;
+    for (int b = 0; b < bins; ++b)
+        for (std::size_t i = 0; i < rule.nodes.size(); ++i) {
+            const double phi = -pi + (b + rule.nodes[i]) * width;
+            sum += rule.weights[i] * width * portable::planar_hg_pdf(phi, g) *
+                   mean_over(collisions, h, phi,
+                             [&](double x, double d) { return (x + half + d) * portable::exp(-sigma * d); });
+        }
+    return sum;
 }
 
 }  // namespace medulla::sim2d

@@ -33,6 +33,7 @@ struct TracerCell {
     std::uint32_t bins = 720;  ///< of the full circle; slab: even
     std::uint64_t seed = 1, cell = 0;
     TracerPlan plan;
+    std::vector<double> absorption = {};  ///< disc: further sums of the same walks, light times exp(-absorption length)
 };
 
 /// The plan that measured best for a cell like this one.
@@ -42,6 +43,8 @@ TracerPlan plan_of(const TracerCell& cell);
 struct TracerSums {
     std::vector<double> bins;   ///< density per radian of the light scattered twice and more
     double length[2] = {0, 0};  ///< disc: path length of all scattered light, [0]; slab: of what `bins` holds, per side
+    std::vector<double> absorbed = {};         ///< [absorption][bins], as `bins`
+    std::vector<double> absorbed_length = {};  ///< [absorption]: path length of what `absorbed` holds
     std::uint64_t walks = 0, scatterings = 0, deposits = 0;
 };
 

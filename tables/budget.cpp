@@ -6,6 +6,8 @@
 #include <mutex>
 #include <optional>
 
+#include "tables/parallel.hpp"
+
 namespace medulla::tables {
 namespace {
 

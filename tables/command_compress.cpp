@@ -144,10 +144,12 @@ void run_diff(const DiffWords& words) {
 
 nlohmann::ordered_json to_json(const std::vector<LobeError>& errors) {
     nlohmann::ordered_json json;
-    for (const LobeError& error : errors)
+    for (const LobeError& error : errors) {
         json[name_of(error.kind)] = {{"relative_l2", error.relative}, {"worst_lobe", error.worst},
                                      {"worst_at", error.worst_at},    {"energy_error", error.energy},
                                      {"least_value", error.least},    {"lobes", error.lobes}};
+        if (error.survival) json[name_of(error.kind)]["survival_error"] = *error.survival;
+    }
     return json;
 }
 
@@ -156,6 +158,10 @@ void print(const std::vector<LobeError>& errors) {
     for (const LobeError& error : errors)
         fmt::print("{:<22} {:>12.3e} {:>12.3e} {:>14.1e}  {}\n", name_of(error.kind), error.relative, error.worst,
                    error.energy, error.worst_at);
+    for (const LobeError& error : errors)
+        if (error.survival)
+            fmt::print("{}: greatest error of the share that absorption leaves {:.1e}\n", name_of(error.kind),
+                       *error.survival);
 }
 
 void add_compress(CLI::App& app, Action& action) {

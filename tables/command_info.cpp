@@ -159,6 +159,27 @@ double share_excess(const Source& pack) {
     return worst;
 }
 
+/// Absorption leaves all at 0 and less and less beyond it, at every node.
+void verify_survival(const Source& pack, const std::string& path) {
+    const std::vector<Axis> axes = pack.parameter_axes(TableKind::azimuthal);  // sigma, g, absorption, h
+    for (const double sigma : axes[0].values)
+        for (const double g : axes[1].values)
+            for (const double h : axes[3].values) {
+                double before = 1;
+                for (const double a : axes[2].values) {
+                    Parameters at;
+                    at.sigma = sigma, at.g = g, at.absorption = a, at.h = h;
+                    const double left = pack.survival(at);
+                    if (!(left > 0 && (a == 0 ? left == 1 : left < before)))
+                        throw Error(
+                            "{}: sigma {:g}, g {:g}, absorption {:g}, h {:g}: expected less to be left than {:g}, "
+                            "found {:g}",
+                            path, sigma, g, a, h, before, left);
+                    before = left;
+                }
+            }
+}
+
 /// Every node of a pack: finite, >= 0, integral 1 but for what holding at 0 adds; shares of energy in [0, 1].
 PackBalance verify_pack(const Source& pack, const std::string& path) {
     PackBalance range;
@@ -173,6 +194,7 @@ PackBalance verify_pack(const Source& pack, const std::string& path) {
         range.energy = std::max(range.energy, error.energy);
         range.least = std::min(range.least, error.least);
     }
+    if (pack.absorbs()) verify_survival(pack, path);
     // A lobe is normalised before its dips below 0 are held there, so its integral exceeds 1 by what they hold. At half
     // of its energy the factors are no densities at all.
     if (range.energy > 0.5)

@@ -13,8 +13,8 @@ namespace {
 using namespace medulla::tables;
 
 struct Words {
-    std::string output = "tables.h5", table = "both", sigma, g, h, theta, method = "auto", progress = "auto",
-                compression = "zstd", shard = "auto", scene;
+    std::string output = "tables.h5", table = "both", sigma, g, h, theta, absorption, method = "auto",
+                progress = "auto", compression = "zstd", shard = "auto", scene;
     std::size_t bins = 720;
     std::uint64_t paths = 100000, seed = 1;
     std::optional<double> target_error, time_budget;
@@ -39,6 +39,8 @@ Request request_of(const Words& words) {
         request.g = axis_of(words.g, "--g-range", request.g);
         request.h = axis_of(words.h, "--h-range", request.h);
         request.theta_i = axis_of(words.theta, "--theta-range", request.theta_i, medulla::pi / 180);
+        if (!words.absorption.empty())
+            request.absorption = graded_axis("absorption", parse_range(words.absorption, "--absorption-range", 8));
         request.bins = words.bins;
         request.paths = words.paths;
         if (words.target_error && *words.target_error == 0)
@@ -206,6 +208,9 @@ void declare(CLI::App& app, Words& words) {
     app.add_option("--h-range", words.h, "offsets LO:HI[:N], nodes denser towards HI (default 0:1:16)");
     app.add_option("--theta-range", words.theta,
                    "inclinations in degrees LO:HI[:N], nodes denser towards HI (default 0:90:16)");
+    app.add_option("--absorption-range", words.absorption,
+                   "optical radii of absorption LO:HI[:N], nodes denser towards LO: a fifth axis of C^N, from the same "
+                   "paths (default: none; N 8)");
     app.add_option("--scene", words.scene, "scene file (JSON): only the nodes that its materials can ask for");
     app.add_flag("--dry-run", words.dry_run, "say what would be simulated and how long it will take; write nothing");
     app.add_option("--bins", words.bins, "exit directions over the full circle, even")->capture_default_str();

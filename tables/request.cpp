@@ -39,6 +39,12 @@ void check_request(const Request& request) {
                                                         {&request.h, "--h-range"},
                                                         {&request.theta_i, "--theta-range"}};
     for (const auto& [axis, option] : axes) check_axis(*axis, option);
+    if (request.absorption.size() > 0) {
+        check_axis(request.absorption, "--absorption-range");
+        if (!request.azimuthal) throw Error("--absorption-range: expected the azimuthal table, which has that axis");
+        if (request.absorption.values.back() > 1000)
+            throw Error("--absorption-range: expected at most 1000, found {:g}", request.absorption.values.back());
+    }
     if (request.sigma.values.back() > 1000)
         throw Error("--sigma-range: expected at most 1000, found {:g}", request.sigma.values.back());
     if (request.bins < 8 || request.bins > 4096 || request.bins % 2 != 0)

@@ -16,8 +16,9 @@ const char* name_of(Method method);
 
 struct Request {
     bool azimuthal = true, longitudinal = true;
-    Axis sigma, g, h, theta_i;  ///< theta_i in radians
-    std::size_t bins = 720;     ///< exit directions over the full circle; half of them on each side of the slab
+    Axis sigma, g, h, theta_i;             ///< theta_i in radians
+    Axis absorption = {"absorption", {}};  ///< of C^N; without values there is no such axis
+    std::size_t bins = 720;  ///< exit directions over the full circle; half of them on each side of the slab
     Method method = Method::automatic;
     std::uint64_t paths = 100000;  ///< per cell, for the random methods, where nothing below is set
     double target_error = 0;       ///< each cell is solved until its relative L2 standard error is below; 0: not set

@@ -27,14 +27,16 @@ void keep(Axis& axis, const std::vector<bool>& needed) {
 }  // namespace
 
 std::optional<Needs> needs_of(const FurParameters<3>& fur) {
-    const double sigma = double(fur.sigma_ms) * double(fur.kappa), eta = double(fur.eta);
+    const double kappa = double(fur.kappa), sigma = double(fur.sigma_ms) * kappa, eta = double(fur.eta);
     if (!(sigma > 0)) return std::nullopt;
     const double cos_t = std::sqrt((eta - 1) * (eta + 1)) / eta;
-    return Needs{sigma, sigma / cos_t, double(fur.g), std::min(1.0, 1 / (eta * double(fur.kappa)))};
+    const double absorption = double(fur.sigma_ma) * kappa;
+    return Needs{sigma, sigma / cos_t, absorption, absorption / cos_t, double(fur.g), std::min(1.0, 1 / (eta * kappa))};
 }
 
 Request restrict_to(const Request& request, const std::vector<Material>& materials, std::vector<std::string>& notes) {
-    std::vector<bool> sigma(request.sigma.size()), g(request.g.size()), h(request.h.size());
+    std::vector<bool> sigma(request.sigma.size()), g(request.g.size()), h(request.h.size()),
+        absorption(request.absorption.size());
     bool any = false;
     for (std::size_t i = 0; i < materials.size(); ++i) {
         const Material& material = materials[i];
@@ -58,10 +60,12 @@ Request restrict_to(const Request& request, const std::vector<Material>& materia
         cover(request.sigma, needs->sigma_low, needs->sigma_high, sigma);
         cover(request.g, needs->g, needs->g, g);
         cover(request.h, request.h.values.front(), needs->h_high, h);
+        if (request.absorption.size() > 0)
+            cover(request.absorption, needs->absorption_low, needs->absorption_high, absorption);
     }
     if (!any) throw Error("/materials: expected a scattering medulla (sigma_ms kappa > 0), found none");
     Request part = request;
-    keep(part.sigma, sigma), keep(part.g, g), keep(part.h, h);
+    keep(part.sigma, sigma), keep(part.g, g), keep(part.h, h), keep(part.absorption, absorption);
     return part;
 }
 

@@ -12,7 +12,8 @@ namespace medulla::tables {
 
 /// What one material can ask the tables for, over all theta_i and h.
 struct Needs {
-    double sigma_low, sigma_high;  ///< sigma_ms kappa / cos theta_t: theta_t from 0 to asin(1 / eta)
+    double sigma_low, sigma_high;            ///< sigma_ms kappa / cos theta_t: theta_t from 0 to asin(1 / eta)
+    double absorption_low, absorption_high;  ///< sigma_ma kappa / cos theta_t likewise
     double g;
     double h_high;  ///< min(1, 1 / (eta kappa)): eta' >= eta
 };

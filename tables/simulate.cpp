@@ -56,6 +56,12 @@ Goal goal_of(const Request& request, double target_error) {
 
 double worst_error(const sim2d::Profile& p) { return p.standard_error; }
 double worst_error(const sim2d::SlabProfile& p) { return std::max(p.back.standard_error, p.forward.standard_error); }
+/// One offset of the disc, at every absorption.
+double worst_error(const std::vector<sim2d::Profile>& cells) {
+    double e = 0;
+    for (const sim2d::Profile& p : cells) e = std::max(e, worst_error(p));
+    return e;
+}
 
 /// Analog paths from the first one on, until the error is at most the target: as many as counting says are missing.
 template <class Trace>
@@ -83,6 +89,11 @@ double error_of_paths(const sim2d::Profile& p, const Goal& goal) {
 }
 double error_of_paths(const sim2d::SlabProfile& p, const Goal& goal) {
     return std::min(error_of_paths(p.back, goal), error_of_paths(p.forward, goal));
+}
+double error_of_paths(const std::vector<sim2d::Profile>& cells, const Goal& goal) {
+    double e = error_of_paths(cells.front(), goal);
+    for (const sim2d::Profile& p : cells) e = std::min(e, error_of_paths(p, goal));
+    return e;
 }
 
 /// In denser discs than this `auto` walks from the start. Seconds to 1e-2 by walks and by grids: at sigma 30, g 0.9
@@ -166,6 +177,8 @@ Tables plan_of(const Request& request) {
         plan.azimuthal.emplace();
         plan.azimuthal->name = "azimuthal";
         plan.azimuthal->axes = {request.sigma, request.g, request.h, exit_axis("phi", request.bins)};
+        if (request.absorption.size() > 0)
+            plan.azimuthal->axes.insert(plan.azimuthal->axes.begin() + 2, request.absorption);
         begin(*plan.azimuthal, request);
     }
     if (request.longitudinal) {
@@ -201,22 +214,33 @@ struct SliceSolver::State {
         const std::vector<double>& offsets = request.h.values;
         const double sigma = request.sigma.values[id.sigma], g = request.g.values[id.g];
         const std::size_t bins = request.bins;
+        // Without an axis of absorption: none.
+        const std::vector<double> absorption =
+            request.absorption.size() > 0 ? request.absorption.values : std::vector<double>{0.0};
         const auto key = [&](std::size_t i) { return cell_key(0, {sigma, g, offsets[i]}); };
-        const std::vector<sim2d::Profile> solved = solve_cells(
+        const std::vector<std::vector<sim2d::Profile>> solved = solve_cells(
             request, sigma <= greatest_grid_sigma, target_error, offsets.size(),
             [&](double aim) {
                 sim2d::DiscOptions grids;
                 grids.target_error = aim;
-                return sim2d::DiscSolver(g, grids).solve(sigma, offsets, bins);
+                const sim2d::DiscSolver solver(g, grids);
+                std::vector<std::vector<sim2d::Profile>> cells(offsets.size());
+                for (const double a : absorption) {
+                    std::vector<sim2d::Profile> row = solver.solve(sigma, a, offsets, bins);
+                    for (std::size_t i = 0; i < offsets.size(); ++i) cells[i].push_back(std::move(row[i]));
+                }
+                return cells;
             },
             [&](std::size_t i, const Goal& goal) {
-                return sim2d::trace_expected_disc(sigma, g, offsets[i], bins, options(goal, key(i)));
+                return sim2d::trace_expected_disc(sigma, g, offsets[i], absorption, bins, options(goal, key(i)));
             },
             [&](std::size_t i, std::uint64_t paths) {
-                return sim2d::trace_disc(sigma, g, offsets[i], bins, options<sim2d::TraceOptions>(paths, key(i)));
+                return sim2d::trace_disc(sigma, g, offsets[i], absorption, bins,
+                                         options<sim2d::TraceOptions>(paths, key(i)));
             });
-        Slice slice(offsets.size(), bins);
-        for (std::size_t i = 0; i < offsets.size(); ++i) store(slice, i, solved[i]);
+        Slice slice(absorption.size() * offsets.size(), bins);  // cells are [absorption][h]
+        for (std::size_t j = 0; j < absorption.size(); ++j)
+            for (std::size_t i = 0; i < offsets.size(); ++i) store(slice, j * offsets.size() + i, solved[i][j]);
         return slice;
     }
 

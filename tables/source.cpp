@@ -1,6 +1,7 @@
 #include "tables/source.hpp"
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <mutex>
@@ -25,6 +26,7 @@ class TableSource : public Source {
         for (const Table* table : tables_.present())
             for (const Axis& axis : parameters_of(*table))
                 splines_.emplace(table->name + axis.name, Spline::through(quantity_of(axis.name), axis.values));
+        if (tables_.azimuthal) lengths_ = survival_lengths(*tables_.azimuthal);
     }
 
     bool has(TableKind kind) const override { return find(kind) != nullptr; }
@@ -59,6 +61,13 @@ class TableSource : public Source {
             total += weight * (table.energy[cell] + table.energy[cell + 1]);
         });
         return total > 0 ? back / total : 0.5;  // nothing scattered: there is no share, and no energy to share
+    }
+
+    double survival(const Parameters& at) const override {
+        if (lengths_.empty()) return 1;
+        double length = 0;
+        for_nodes(*tables_.azimuthal, at, [&](std::size_t cell, double weight) { length += weight * lengths_[cell]; });
+        return std::exp(-at.absorption * length);
     }
 
   private:
@@ -100,6 +109,7 @@ class TableSource : public Source {
 
     Tables tables_;
     std::map<std::string, Spline> splines_;
+    std::vector<double> lengths_;  ///< survival_lengths
 };
 
 /// Of a pack: as many nodes on an axis as a tables file may have, and lobes that a program can list.
@@ -167,6 +177,13 @@ class PackSource : public Source {
         const TableView& table = pack_[TableKind::back_fraction];
         if (!table) throw Error("the pack has no table of the slab's energies");
         return static_cast<double>(scalar(table, contract(table, query(at))));
+    }
+
+    double survival(const Parameters& at) const override {
+        if (!absorbs()) return 1;
+        const TableView& table = pack_[TableKind::survival];
+        if (!table) throw Error("the pack has no table of what absorption leaves");
+        return survival_of(at.absorption, static_cast<double>(scalar(table, contract(table, query(at)))));
     }
 
   private:
@@ -256,6 +273,8 @@ const char* name_of(TableKind kind) {
             return "longitudinal forward";
         case TableKind::back_fraction:
             return "longitudinal energies";
+        case TableKind::survival:
+            return "azimuthal survival";
     }
     return "?";
 }
@@ -264,6 +283,8 @@ const char* exit_name(TableKind kind) { return kind == TableKind::azimuthal ? "p
 
 void Source::check(TableKind kind, const Parameters& at, const std::string& path) const {
     if (!has(kind)) throw Error("{}: expected a table of {} lobes, found none", path, name_of(kind));
+    if (kind == TableKind::azimuthal && at.absorption != 0 && !absorbs())
+        throw Error("{}: expected absorption 0, since there is no such axis, found {:g}", path, at.absorption);
     for (const Axis& axis : parameter_axes(kind)) {
         const double x = at[axis.name], low = axis.values.front(), high = axis.values.back();
         // Packs keep their axes in float: half a unit in its last place is no reason to refuse an end.
@@ -273,8 +294,14 @@ void Source::check(TableKind kind, const Parameters& at, const std::string& path
     }
 }
 
+bool Source::absorbs() const {
+    if (!has(TableKind::azimuthal)) return false;
+    const std::vector<Axis> axes = parameter_axes(TableKind::azimuthal);
+    return std::any_of(axes.begin(), axes.end(), [](const Axis& axis) { return axis.name == "absorption"; });
+}
+
 double energy_of(const Source& source, TableKind kind, const Parameters& at) {
-    if (kind == TableKind::azimuthal) return azimuthal_energy(at.sigma, at.h);
+    if (kind == TableKind::azimuthal) return azimuthal_energy(at.sigma, at.h) * source.survival(at);
     const double back = source.back_fraction(at), total = longitudinal_energy(at.sigma, at.theta_i);
     return total * (kind == TableKind::longitudinal_back ? back : 1 - back);
 }
@@ -313,7 +340,9 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
         error.kind = kind;
         error.lobes = 1;
         for (const Axis& axis : axes) error.lobes *= axis.size();
-        std::vector<double> misfit(error.lobes), norm(error.lobes), energy(error.lobes), least(error.lobes);
+        const bool survives = kind == TableKind::azimuthal && reference.absorbs() && candidate.absorbs();
+        std::vector<double> misfit(error.lobes), norm(error.lobes), energy(error.lobes), least(error.lobes),
+            survival(error.lobes, 0.0);
         const auto parameters = [&](std::size_t index) {
             Parameters at;
             for (std::size_t k = axes.size(); k-- > 0; index /= axes[k].size())
@@ -333,7 +362,9 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
                 b[j] -= a[j];
             }
             norm[i] = norm2(a), misfit[i] = norm2(b), energy[i] = std::abs(sum * width - 1), least[i] = low;
+            if (survives) survival[i] = std::abs(candidate.survival(at) - reference.survival(at));
         });
+        if (survives) error.survival = *std::max_element(survival.begin(), survival.end());
         double total = 0, total_misfit = 0;
         error.least = least[0];
         std::size_t worst = 0;

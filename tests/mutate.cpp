@@ -244,6 +244,7 @@ Request small_request() {
     request.g = graded_axis("g", {0, 0.6, 2});
     request.h = graded_axis("h", {0, 1, 3});
     request.theta_i = graded_axis("theta_i", {0, 1.2, 2});
+    request.absorption = graded_axis("absorption", {0, 1, 2});
     request.bins = 36;
     request.paths = 500;
     request.method = Method::analog;
@@ -277,7 +278,9 @@ bool ask(const PackView& pack, Random& random) {
     for (const TableView& table : pack.tables) {
         if (!table || !table.has_exit()) continue;
         const auto kind = static_cast<TableKind>(table.layout.kind);
-        if (kind == TableKind::azimuthal) sum += azimuthal(pack, sigma, g, h, 1.0f);
+        if (kind == TableKind::azimuthal)
+            for (const float absorption : {0.0f, 0.7f, 30.0f, -1.0f})
+                sum += azimuthal(pack, sigma, g, h, 1.0f, absorption);
         if (kind == TableKind::longitudinal_back) sum += longitudinal(pack, Side::back, sigma, g, h, 0.3f);
         if (kind == TableKind::longitudinal_forward) sum += longitudinal(pack, Side::forward, sigma, g, h, 0.3f);
         LobeQuery query = {};

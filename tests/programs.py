@@ -48,7 +48,7 @@ class Programs(unittest.TestCase):
     def test_wrong_words_are_status_2(self):
         for words in (["--sigma-range", "2:1"], ["--sigma-range", "x"], ["--bins", "7"], ["--bins", "0"],
                       ["--g-range", "0:1"], ["--h-range", "0:2"], ["--theta-range", "0:91"], ["--table", "both!"],
-                      ["--paths", "0"], ["--paths", "-5"], ["--nonsense"], ["--method", "magic"], ["--threads", "-1"]):
+                      ["--paths", "0"], ["--paths", "-5"], ["--absorption-range", "-1:2"], ["--nonsense"], ["--method", "magic"], ["--threads", "-1"]):
             self.fails(2, "medulla-precompute", "-o", self.path("never.h5"), *words, names=[words[0]])
             self.assertFalse(os.path.exists(self.path("never.h5")))
         self.fails(2, "furtable")
@@ -229,6 +229,54 @@ class Programs(unittest.TestCase):
         self.assertEqual(status, 0, err)
         self.assertEqual(numpy.load(self.path("a.npy")).shape, (5, 3, 4, 72))
         self.assertEqual(run("furtable", "export", self.path("t.furpack"), "--format", "cpp", "-o", self.path("p.hpp"))[0], 0)
+
+    def test_axis_of_absorption(self):
+        words = ["--table", "azimuthal", "--absorption-range", "0:2:4", *SMALL]
+        file, pack = self.path("absorb.h5"), self.path("absorb.furpack")
+        for share in (1, 2):
+            self.assertEqual(run("medulla-precompute", "-o", self.path("shares.h5"), "--shard", f"{share}/2", *words)[0], 0)
+        self.assertEqual(run("medulla-precompute", "-o", file, *words)[0], 0)
+        self.assertEqual(run("furtable", "merge", self.path("shares.h5.shards"), "-o", self.path("merged.h5"))[0], 0)
+        tables = [json.loads(run("furtable", "info", f, "--json")[1]) for f in (file, self.path("merged.h5"))]
+        self.assertEqual(tables[0]["sha256"], tables[1]["sha256"])
+        axes = tables[0]["tables"]["azimuthal"]["axes"]
+        self.assertEqual([a["name"] for a in axes], ["sigma", "g", "absorption", "h", "phi"])
+        self.assertEqual((len(axes[2]["values"]), axes[2]["values"][0], axes[2]["values"][-1]), (4, 0, 2))
+        status, out, err = run("furtable", "compress", file, "--rank", 24)
+        self.assertEqual(status, 0, err)
+        info = json.loads(run("furtable", "info", pack, "--json")[1])
+        self.assertEqual([a["name"] for a in info["tables"]["azimuthal survival"]["axes"]],
+                         ["sigma", "g", "absorption", "h"])
+        for other in (file, pack):
+            self.assertEqual(run("furtable", "verify", other)[0], 0, other)
+            energies = []
+            for absorption in (0, 0.3, 1.1, 2):
+                status, out, err = run("furtable", "query", other, "--table", "azimuthal", "--sigma", 1.2, "--g", 0.3,
+                                       "--h", -0.5, "--absorption", absorption, "--json")
+                self.assertEqual(status, 0, err)
+                lobe = json.loads(out)
+                energies.append(lobe["energy"])
+                self.assertEqual(lobe["absorption"], absorption)
+                self.assertAlmostEqual(sum(lobe["density"]) * 2 * math.pi / 72 / lobe["energy"], 1, delta=1e-2)
+            self.assertAlmostEqual(energies[0], 1 - math.exp(-2.4 * math.sqrt(0.75)), places=6)
+            self.assertEqual(energies, sorted(energies, reverse=True))
+            self.assertLess(energies[-1], 0.5 * energies[0])
+            self.fails(1, "furtable", "query", other, "--table", "azimuthal", "--sigma", 1.2, "--g", 0.3, "--h", 0.5,
+                       "--absorption", 2.5, names=["absorption", "2.5"])
+        errors = json.loads(run("furtable", "diff", file, pack, "--json")[1])["errors"]["azimuthal"]
+        self.assertLess(errors["relative_l2"], 0.02)
+        self.assertLess(errors["survival_error"], 2e-3)
+        # Without the axis: the same lobes at absorption 0, and no answer above it.
+        plain = json.loads(run("furtable", "diff", self.path("t.h5"), file, "--json")[1])["errors"]["azimuthal"]
+        self.assertEqual(plain["relative_l2"], 0)
+        self.fails(1, "furtable", "diff", file, self.path("t.h5"), names=["absorption"])
+        self.fails(1, "furtable", "query", "t.h5", "--table", "azimuthal", "--sigma", 1, "--g", 0.3, "--h", 0.5,
+                   "--absorption", 1, names=["absorption"])
+        self.fails(2, "furtable", "query", "t.h5", "--table", "longitudinal", "--sigma", 1, "--g", 0.3, "--theta", 10,
+                   "--absorption", 1)
+        self.fails(2, "medulla-precompute", "-o", self.path("never.h5"), "--table", "longitudinal",
+                   "--absorption-range", "0:1", names=["--absorption-range"])
+        self.assertEqual(run("furtable", "plot", file, pack, "-o", self.path("absorb.svg"))[0], 0)
 
     def test_no_temporary_file_is_left(self):
         self.assertEqual([name for name in os.listdir(self.folder.name) if ".tmp" in name], [])

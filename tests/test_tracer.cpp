@@ -303,4 +303,77 @@ TEST_CASE("The tracer holds at the ends of every range", "[tracer][stress]") {
     CHECK_THROWS_AS(trace_expected_slab(1, 0, 0, 8, options(0)), std::invalid_argument);
 }
 
+TEST_CASE("Walks with absorption: the deterministic solver's lobes, energies and lengths by z-scores",
+          "[tracer][absorption]") {
+    // As above: E[true error^2 - standard error^2] = 0 over independent repetitions, at 5 of its own standard errors,
+    // for lobes and energies. Means over the repetitions at 5 of their standard errors; energies of the reference keep
+    // 2e-4, its lengths 1e-3 and 3e-5 over the share of collided light that leaves (sim2d/disc_deterministic.hpp).
+    const std::vector<double> absorption{0.0, 0.1, 1.0, 6.0}, h{0.0, 0.55, 0.97};
+    for (const double g : {0.0, 0.6, 0.95}) {
+        const DiscSolver solver(g);
+        for (const double sigma : {0.05, 0.7, 8.0}) {
+            std::vector<std::vector<Profile>> exact;
+            for (const double a : absorption) exact.push_back(solver.solve(sigma, a, h, 360));
+            for (std::size_t i = 0; i < h.size(); ++i) {
+                std::vector<std::vector<double>> lobe(4), energy(4), excess(4), length(4);
+                bool falls = true;
+                for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+                    const auto found = trace_expected_disc(sigma, g, h[i], absorption, 360, options(512, seed)).profile;
+                    for (std::size_t j = 0; j < 4; ++j) {
+                        const Profile &p = found[j], &truth = exact[j][i];
+                        const double e = p.standard_error, miss = p.energy - truth.energy;
+                        lobe[j].push_back(distance2(p.lobe, truth.lobe) - e * e);
+                        energy[j].push_back(p.energy), length[j].push_back(p.mean_length);
+                        excess[j].push_back(miss * miss - p.energy_error * p.energy_error);
+                        // The same walks: less is left, and what is left went the shorter ways.
+                        if (j > 0) falls = falls && p.energy < found[j - 1].energy;
+                    }
+                }
+                CHECK(falls);
+                for (std::size_t j = 0; j < 4; ++j) {
+                    const Profile& truth = exact[j][i];
+                    const double extinction = sigma + absorption[j];
+                    const double leaves = truth.energy / (disc_energy(extinction, h[i]) * sigma / extinction);
+                    const Moments m = moments(lobe[j]), e = moments(energy[j]), x = moments(excess[j]),
+                                  l = moments(length[j]);
+                    INFO("sigma " << sigma << " g " << g << " h " << h[i] << " absorption " << absorption[j]);
+                    INFO("lobe excess " << m.mean << " +- " << m.error << ", energy excess " << x.mean << " +- "
+                                        << x.error);
+                    INFO("energy " << e.mean << " +- " << e.error << " true " << truth.energy << " length " << l.mean
+                                   << " +- " << l.error << " true " << truth.mean_length);
+                    CHECK(std::abs(m.mean) < 5 * m.error + 4e-6 + 4 * truth.standard_error * truth.standard_error);
+                    CHECK(std::abs(e.mean - truth.energy) < 5 * e.error + 2e-4 * truth.energy);
+                    CHECK(std::abs(x.mean) < 5 * x.error + 4e-8 * truth.energy * truth.energy);
+                    CHECK(std::abs(l.mean - truth.mean_length) <
+                          5 * l.error + 1e-3 * truth.mean_length + 3e-5 / leaves);
+                }
+            }
+        }
+    }
+}
+
+TEST_CASE("Walks without absorption in the list are those of the plain tracer, byte for byte", "[tracer][absorption]") {
+    for (const double sigma : {0.0, 1e-8, 3.0}) {
+        const Traced<Profile> plain = trace_expected_disc(sigma, 0.8, 0.4, 96, options(2048));
+        const auto all = trace_expected_disc(sigma, 0.8, 0.4, {1.5, 0.0, 200.0}, 96, options(2048));
+        CHECK(all.scatterings == plain.scatterings);
+        CHECK(all.profile[1].lobe == plain.profile.lobe);
+        CHECK(all.profile[1].standard_error == plain.profile.standard_error);
+        CHECK(all.profile[1].energy == plain.profile.energy);
+        CHECK(all.profile[1].mean_length == plain.profile.mean_length);
+        // An empty disc: what is scattered once is closed form, and all there is.
+        if (sigma < 1e-6)
+            for (const std::size_t j : {0u, 2u}) {
+                const double a = j == 0 ? 1.5 : 200;
+                const std::vector<double> lobe = disc_single_lobe(a, 0.8, 0.4, 96);
+                const double share = sum(lobe) * 2 * pi / 96;
+                for (std::size_t b = 0; b < 96; ++b)
+                    CHECK(all.profile[j].lobe[b] == Approx(lobe[b] / share).epsilon(1e-5).margin(1e-12));
+                CHECK(all.profile[j].mean_length == Approx(disc_single_length(a, 0.8, 0.4) / share).epsilon(1e-5));
+            }
+    }
+    CHECK_THROWS_AS(trace_expected_disc(1, 0, 0, {-1.0}, 8, {}), std::invalid_argument);
+    CHECK_THROWS_AS(trace_disc(1, 0, 0, {std::nan("")}, 8, {}), std::invalid_argument);
+}
+
 }  // namespace

@@ -104,17 +104,20 @@ struct Absorption {
     float medulla_extinction;  ///< (sigma_ma + sigma_ms) / cos theta_t
     float medulla_scattering;  ///< sigma_ms / cos theta_t
     float cortex[Channels];    ///< sigma_ca / cos theta_t
-    float T_b[Channels];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t)
+    float T_b[Channels];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
 };
 
+/// @param tabled the tables know what the medulla absorbs of scattered light: T_b leaves it out
 template <int Channels>
-MEDULLA_FN Absorption<Channels> absorption(const FurParameters<Channels>& p, float inverse_cos_t) noexcept {
+MEDULLA_FN Absorption<Channels> absorption(const FurParameters<Channels>& p, float inverse_cos_t,
+                                           bool tabled = false) noexcept {
     Absorption<Channels> a;
+    const float medulla = tabled ? 0.0f : p.kappa * p.sigma_ma * inverse_cos_t;
     a.medulla_extinction = (p.sigma_ma + p.sigma_ms) * inverse_cos_t;
     a.medulla_scattering = p.sigma_ms * inverse_cos_t;
     for (int c = 0; c < Channels; ++c) {
         a.cortex[c] = p.sigma_ca[c] * inverse_cos_t;
-        a.T_b[c] = real_math::exponential(-(p.kappa * p.sigma_ma * inverse_cos_t + (1 - p.kappa) * a.cortex[c]));
+        a.T_b[c] = real_math::exponential(-(medulla + (1 - p.kappa) * a.cortex[c]));
     }
     return a;
 }

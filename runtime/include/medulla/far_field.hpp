@@ -67,7 +67,7 @@ struct FarField {
     detail::Cuts cuts[3];                 ///< of R, TT, TRT
     int nodes = 0;                        ///< scattering nodes
     ScatteringNode<Channels> node[most_scattering_nodes];
-    float sigma_weight[max_rank];  ///< azimuthal table contracted to this theta_i's sigma
+    float sigma_weight[max_rank];  ///< azimuthal table contracted to this theta_i's sigma and absorption
 
     MEDULLA_FN const FurFibre<Channels>& fibre() const noexcept { return *near.fibre; }
     MEDULLA_FN LobeValues<Channels> lobes(float theta_r, float phi) const noexcept;
@@ -250,7 +250,7 @@ MEDULLA_FN float place_panel(FarField<Channels>& far, float a, float b, GaussRul
     for (int j = 0; 2 * j < rule.half && far.nodes + 4 <= most_scattering_nodes; ++j) {
         const Offset<Four> at = offset_inside(far.rim, rule_nodes(rule, j, middle, half));
         const Path<Four> path = trace(m.at, parameters.kappa, parameters.layers, at.h, at.cos_i);
-        const Energies<Channels, Four> e = energies(path, m.absorption, true);
+        const Energies<Channels, Four> e = energies_at(far.fibre(), m, path, true);
         const Four weight = rule_weights(rule, j) * Four(half * far.inverse_width) * at.dh;
         const Four offset = magnitude(path.h_inside) * Four(1 / parameters.kappa);
         Four sum, share[2], centre[2];
@@ -344,7 +344,8 @@ MEDULLA_FN void far_field(const FurFibre<Channels>& fibre, float theta_i, Offset
     far.gamma_rim = angle(far.rim);
     for (int p = 0; p < 3; ++p) detail::place_cuts(far, p);
     if (!fibre.scattered) return;
-    contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, far.near.longitudinal.sigma, fibre.azimuthal.weight,
+    const float* weight = weights_at(fibre.azimuthal, far.near.longitudinal.absorbed, far.sigma_weight);
+    contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, far.near.longitudinal.sigma, weight,
                   far.sigma_weight);
     detail::place_scattering_nodes(far);
 }

@@ -52,8 +52,13 @@ enum class TableKind : std::uint32_t {
     longitudinal_back = 1,     ///< C^M of the backward side, axes (sigma, g, theta_i, theta_r)
     longitudinal_forward = 2,  ///< C^M of the forward side, the same axes
     back_fraction = 3,         ///< share of the slab's scattered energy that leaves backward, axes (sigma, g, theta_i)
+    survival =
+        4,  ///< length l: exp(-absorption l) of the disc's scattered light is left, axes (sigma, g, absorption, h)
 };
-inline constexpr std::uint32_t table_kinds = 4;
+inline constexpr std::uint32_t table_kinds = 5;
+
+/// Whether a table has an exit axis: lobes do.
+MEDULLA_FN constexpr bool is_lobe(TableKind kind) noexcept { return kind <= TableKind::longitudinal_forward; }
 
 struct PackHeader {
     char magic[8];
@@ -198,7 +203,7 @@ MEDULLA_FN bool inside(std::uint64_t offset, std::uint64_t bytes, std::uint64_t 
     return offset >= sizeof(PackHeader) && offset <= total && bytes <= total - offset;
 }
 
-/// Axes of a kind in their order; absorption may follow g in the azimuthal table.
+/// Axes of a kind in their order; absorption may follow g in the azimuthal table, and does in that of survival.
 MEDULLA_FN bool axes_fit(const PackTable& table) noexcept {
     const auto kind = static_cast<TableKind>(table.kind);
     Quantity expected[max_axes] = {Quantity::sigma, Quantity::g};
@@ -207,16 +212,19 @@ MEDULLA_FN bool axes_fit(const PackTable& table) noexcept {
         if (table.axis_count == 5) expected[n++] = Quantity::absorption;
         expected[n++] = Quantity::h;
         expected[n++] = Quantity::phi;
+    } else if (kind == TableKind::survival) {
+        expected[n++] = Quantity::absorption;
+        expected[n++] = Quantity::h;
     } else {
         expected[n++] = Quantity::theta_i;
-        if (kind != TableKind::back_fraction) expected[n++] = Quantity::theta_r;
+        if (is_lobe(kind)) expected[n++] = Quantity::theta_r;
     }
     if (table.axis_count != n) return false;
     for (std::uint32_t k = 0; k < n; ++k) {
         if (table.axes[k].quantity != static_cast<std::uint32_t>(expected[k])) return false;
         if (table.axes[k].spans < 1 || table.axes[k].spans > max_spans) return false;
     }
-    return (table.integrals_offset != 0) == (kind != TableKind::back_fraction);
+    return (table.integrals_offset != 0) == is_lobe(kind);
 }
 
 MEDULLA_FN PackStatus check_knots(const AxisView<float>& axis) noexcept {

@@ -190,7 +190,7 @@ struct FarSampler {
 
   private:
     MEDULLA_FN detail::LobeShares shares_at(const Path<float>& path) const noexcept {
-        return detail::lobe_shares(energies(path, far->near.longitudinal.absorption, far->nodes > 0));
+        return detail::lobe_shares(energies_at(far->fibre(), far->near.longitudinal, path, far->nodes > 0));
     }
     MEDULLA_FN float scattered_azimuth(int p, float phi) const noexcept {
         float sum = even_share * float(1 / (2 * pi));
@@ -254,7 +254,7 @@ MEDULLA_FN float FarSampler<Channels>::pdf_angular(float theta_r, float phi) con
         if (!(M > 0)) continue;
         Four average;
         detail::visit_unscattered(*far, p, turned, [&](const Path<Four>& path, Four weight, Four D) {
-            const auto e = energies(path, far->near.longitudinal.absorption, far->nodes > 0);
+            const auto e = energies_at(far->fibre(), far->near.longitudinal, path, far->nodes > 0);
             Four all, own;
             for (int lobe = 0; lobe < lobe_count; ++lobe)
                 for (int c = 0; c < Channels; ++c) all = all + e.A[lobe][c];

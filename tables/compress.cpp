@@ -12,8 +12,8 @@ namespace medulla::tables {
 namespace {
 
 constexpr int rank_step = static_cast<int>(rank_multiple), greatest_rank = static_cast<int>(max_rank);
-/// Of the slab's energies: three small axes, more rank is only rounding.
-constexpr int energy_rank = 24;
+/// Of the energies: more rank is only rounding. The slab's have three small axes, the disc's with absorption four.
+int energy_rank(const Part& part) { return part.kind == TableKind::survival ? 48 : 24; }
 /// Of the solves that say how hard each part is.
 constexpr int pilot_rank = 32;
 /// Room kept for the provenance text when a pack must fit into a number of bytes.
@@ -171,7 +171,7 @@ double kind_error(const Solves& solves, std::size_t first, std::size_t last) {
 void solve_to(Solves& solves, double error, const CompressOptions& options) {
     for (const auto& [first, last] : kinds_of(solves)) {
         if (!solves[first].part->lobes()) {
-            solves[first].rank = energy_rank;
+            solves[first].rank = energy_rank(*solves[first].part);
             continue;
         }
         double spline = 0;
@@ -280,7 +280,7 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
     Solves solves;
     const bool searched = options.max_error || options.max_bytes;
     const int rank = searched ? pilot_rank : options.rank;
-    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank});
+    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank(part)});
     if (searched) run(solves, options, true);
     if (options.max_error) solve_to(solves, *options.max_error, options);
     if (options.max_bytes) share_bytes(solves, *options.max_bytes);

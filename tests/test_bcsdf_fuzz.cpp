@@ -58,6 +58,21 @@ bool good(float x) {
 
 }  // namespace
 
+TEST_CASE("far field of a dense medulla that reaches the rim, next to grazing light", "[bcsdf]") {
+    // Found by fuzzing: nodes within 1e-3 of the rim, where a sine that rounds above 1 had no cosine.
+    const analytic::AnalyticPack pack;
+    FurParameters<3> p;
+    p.eta = 1.0001f, p.kappa = 1, p.beta_m = p.beta_n = 0.3f, p.layers = 2, p.sigma_ms = 9.87f, p.g = 0.95f;
+    FurFibre<3> fibre;
+    REQUIRE(prepare(p, pack.view, fibre) == FurStatus::ok);
+    for (int i = 0; i < 2000; ++i) {
+        FarField<3> far;
+        far_field(fibre, 1.5692f + 1e-6f * float(i), OffsetRange{}, far);
+        const Colour<3> value = far.eval(0.4f, 3.0f);
+        REQUIRE(good(value.value[0]));
+    }
+}
+
 TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
     const analytic::AnalyticPack pack;
     const char* wanted = std::getenv("MEDULLA_FUZZ");  // fibres; each is asked 77 times, near, far, by samples

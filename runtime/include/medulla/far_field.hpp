@@ -87,8 +87,8 @@ struct Offset {
 template <class T>
 MEDULLA_FN Offset<T> offset_inside(float rim, T psi) noexcept {
     const auto sc = real_math::sine_cosine(psi);
-    const T h = T(rim) * sc.sine;
-    return {h, square_root((T(1.0f) - h) * (T(1.0f) + h)), T(rim) * sc.cosine};
+    const T along = T(rim) * sc.cosine;  // 1 - h^2 without a difference that rounding could make negative
+    return {T(rim) * sc.sine, square_root(T((1 - rim) * (1 + rim)) + along * along), along};
 }
 template <class T>
 MEDULLA_FN Offset<T> offset_at_angle(T gamma) noexcept {

@@ -1,9 +1,9 @@
-// The BCSDF in a kernel: prepared on the host, evaluated and sampled on the device. Compiled where there is an nvcc.
+// The BCSDF in kernels: a material prepared once, then evaluated and sampled per thread. Compiled where there is an nvcc.
 #include "medulla/medulla.hpp"
 
 using namespace medulla;
 
-/// One exit and one sample per thread. `fibre` was prepared on the host from view_of_copy(pack, its bytes on the device).
+/// One exit and one sample per thread.
 __global__ void shade(const FurFibre<3>* fibre, const float* h, const RandomNumbers* u, FurSample<3>* sample,
                       Colour<3>* near_value, Colour<3>* far_value) {
     const unsigned i = blockIdx.x * blockDim.x + threadIdx.x;
@@ -16,7 +16,7 @@ __global__ void shade(const FurFibre<3>* fibre, const float* h, const RandomNumb
     far_value[i] = eval(*fibre, 0.3f, sample[i].theta_r, sample[i].phi, OffsetRange{});
 }
 
-/// Preparing is device code as well, for materials that change from point to point.
+/// `pack` is view_of_copy(a pack that the host opened, its bytes' copy on the device).
 __global__ void material(PackView pack, FurParameters<3> parameters, FurFibre<3>* fibre) {
     prepare(parameters, pack, *fibre);
 }

@@ -53,6 +53,12 @@ Material material_of(const json& entry, const std::string& where) {
             material.name = value.get<std::string>();
             continue;
         }
+        if (key == "fresnel") {
+            if (value != "bravais" && value != "exact")
+                throw Error("{}: expected \"bravais\" or \"exact\", found {}", field, value.dump());
+            fur.fresnel = value == "exact" ? Fresnel::exact : Fresnel::bravais;
+            continue;
+        }
         if (key == "sigma_ca") {
             material.grey = !value.is_array();
             if (value.is_array() && value.size() != 3)
@@ -67,7 +73,7 @@ Material material_of(const json& entry, const std::string& where) {
         if (!known)
             throw Error(
                 "{}: no such field; expected name, preset, eta, kappa, alpha, beta_m, beta_n, layers, sigma_ca, "
-                "sigma_ms, sigma_ma or g",
+                "sigma_ms, sigma_ma, g or fresnel",
                 field);
     }
     if (const FurStatus status = check(fur); status != FurStatus::ok) throw Error("{}: {}", where, describe(status));

@@ -16,7 +16,8 @@ struct Lobes {
     double M[lobe_count] = {}, N[lobe_count][3] = {};
 };
 
-/// Unpolarised sums as printed: R + (1-R)^2 R / (1-R^2), averaged over both polarisations of eta' at gamma_i.
+/// Unpolarised sums as printed: R + (1-R)^2 R / (1-R^2), averaged over both polarisations of an interface of `index`
+/// met at the angle gamma_i.
 inline double cuticle_reflectance(double index, double gamma_i, double layers) {
     const double ci = std::cos(gamma_i), ct = std::sqrt(1 - std::pow(std::sin(gamma_i) / index, 2));
     double F1 = 0;
@@ -44,19 +45,21 @@ inline double wrapped(double x, double s) {
 }
 
 inline Lobes near_lobes(const FurParameters<3>& p, const PackView& pack, double theta_i, double theta_r, double phi,
-                        double h) {
+                        double h, bool with_scattered = true) {
     Lobes l;
     const double eta = double(p.eta), kappa = double(p.kappa);
     const double index = std::sqrt(eta * eta - std::pow(std::sin(theta_i), 2)) / std::cos(theta_i);
     const double cos_t = std::cos(std::asin(std::sin(theta_i) / eta));
     const double gamma_i = std::asin(h), gamma_t = std::asin(h / index), inside = h / index;
     const double s_m = std::sqrt(std::max(0.0, kappa * kappa - inside * inside)), s_c = std::cos(gamma_t) - s_m;
-    const double F = cuticle_reflectance(index, gamma_i, double(p.layers));
+    const double F = p.fresnel == Fresnel::exact
+                         ? cuticle_reflectance(eta, std::acos(std::cos(theta_i) * std::cos(gamma_i)), double(p.layers))
+                         : cuticle_reflectance(index, gamma_i, double(p.layers));
     const double shift[3] = {1, -0.5, -1.5}, rough[3] = {1, 0.5, 1.5};
     for (int k = 0; k < 3; ++k)
         l.M[k] = truncated(theta_r, -theta_i + shift[k] * double(p.alpha), rough[k] * double(p.beta_m));
     const double ms = double(p.sigma_ms), ma = double(p.sigma_ma);
-    const bool scattered = std::abs(inside) < kappa && ms > 0;
+    const bool scattered = with_scattered && std::abs(inside) < kappa && ms > 0;
     const bool tabled = absorbs(pack);  // the tables know what the medulla absorbs; else T_b has it
     double C[3] = {}, M = 0;
     if (scattered) {

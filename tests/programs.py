@@ -278,6 +278,59 @@ class Programs(unittest.TestCase):
                    "--absorption-range", "0:1", names=["--absorption-range"])
         self.assertEqual(run("furtable", "plot", file, pack, "-o", self.path("absorb.svg"))[0], 0)
 
+    def test_bcsdf_and_presets(self):
+        presets = json.loads(run("furtable", "presets", "--json")[1])["presets"]
+        self.assertEqual(len(presets), 10)
+        self.assertEqual(presets[0], {"name": "bobcat", "kappa": 0.88, "eta": 1.69, "alpha": 5.48, "beta_m": 11.64,
+                                      "beta_n": 7.49, "sigma_ca": 0.64, "sigma_ms": 1.69, "sigma_ma": 0.17, "g": 0.44,
+                                      "layers": 0.47})
+        text = run("furtable", "presets")[1].splitlines()
+        self.assertEqual([line.split()[0] for line in text[2:]], [p["name"] for p in presets])
+        where = ["--theta-i", 20, "--theta-r", -15, "--phi", 170]
+
+        def lobes(*words):
+            status, out, err = run("furtable", "bcsdf", *words, "--json")
+            self.assertEqual((status, err), (0, ""))
+            answer = json.loads(out)
+            self.assertEqual(list(answer["lobes"]), ["R", "TT", "TRT", "TTs", "TRTs"])
+            return answer
+
+        cat = lobes("--preset", "cat", *where, "--h", 0.3)
+        cosine = math.cos(math.radians(20))
+        for lobe in cat["lobes"].values():
+            self.assertAlmostEqual(lobe["value"], lobe["M"] * lobe["N"] / cosine ** 2, delta=1e-6 * (1 + lobe["value"]))
+        self.assertAlmostEqual(cat["sum"], sum(lobe["value"] for lobe in cat["lobes"].values()), places=9)
+        self.assertGreater(cat["lobes"]["TTs"]["value"], 0.01)
+        self.assertEqual(lobes("--preset", "cat", *where, "--h-range", "-1:1"), lobes("--preset", "cat", *where, "--far"))
+        self.assertEqual(lobes("--preset", "cat", *where, "--h-range", "0.3:0.3"), cat)
+        # The same from a material file, whose angles are degrees; three sigma_ca make arrays of three.
+        material = self.path("m.json")
+        with open(material, "w") as f:
+            json.dump({k: v for k, v in presets[1].items()}, f)
+        same = lobes("--material", material, *where, "--h", 0.3)
+        for name, lobe in same["lobes"].items():  # a degree to a radian is rounded once more
+            self.assertAlmostEqual(lobe["value"], cat["lobes"][name]["value"], delta=1e-5 * (1 + lobe["value"]))
+        with open(material, "w") as f:
+            json.dump({"preset": "cat", "sigma_ca": [0.06, 0.5, 2], "fresnel": "exact"}, f)
+        colour = lobes("--material", material, *where, "--h", 0.3)
+        self.assertEqual(len(colour["sum"]), 3)
+        self.assertGreater(colour["sum"][0], colour["sum"][1])
+        self.assertNotEqual(colour["lobes"]["TT"]["N"][0], cat["lobes"]["TT"]["N"])
+        rows = run("furtable", "bcsdf", "--preset", "cat", *where, "--h", 0.3)[1].splitlines()
+        self.assertEqual([row.split()[0] for row in rows], ["lobe", "R", "TT", "TRT", "TTs", "TRTs", "sum"])
+
+        self.fails(2, "furtable", "bcsdf", "--preset", "lion", *where, "--far", names=["--preset", "bobcat", "lion"])
+        self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, names=["--h"])
+        self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, "--h", 2, names=["--h", "[-1, 1]", "2"])
+        self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, "--h-range", "1:0", names=["--h-range", "1:0"])
+        self.fails(2, "furtable", "bcsdf", "--preset", "cat", "--theta-i", 91, *where[2:], "--far", names=["--theta-i"])
+        self.fails(1, "furtable", "bcsdf", "--material", "none.json", *where, "--far", names=["none.json"])
+        self.fails(1, "furtable", "bcsdf", "--preset", "cat", *where, "--far", "--pack", "none", names=["none"])
+        for field, value in (("eta", 0.5), ("fresnel", "none"), ("sigma_ca", [1, 2]), ("colour", 1), ("kappa", "big")):
+            with open(material, "w") as f:
+                json.dump({"preset": "cat", field: value}, f)
+            self.fails(1, "furtable", "bcsdf", "--material", material, *where, "--far", names=["m.json", field])
+
     def test_no_temporary_file_is_left(self):
         self.assertEqual([name for name in os.listdir(self.folder.name) if ".tmp" in name], [])
 

@@ -71,6 +71,7 @@ TEST_CASE("near field equals the double-precision twin", "[bcsdf]") {
             p.beta_m = 0.02f + u(random), p.beta_n = 0.02f + u(random), p.g = 0.6f * u(random);
         }
         p.sigma_ca[1] *= 2, p.sigma_ca[2] *= 0.1f;
+        p.fresnel = i % 2 == 0 ? Fresnel::bravais : Fresnel::exact;
         const float theta_i = 1.55f * (2 * u(random) - 1), h = 2 * u(random) - 1, phi = 6.28f * (u(random) - 0.5f);
         const float theta_r =
             std::max(-1.57f, std::min(1.57f, i % 2 ? 3.1f * (u(random) - 0.5f) : -theta_i + 0.1f * (u(random) - 0.5f)));
@@ -117,6 +118,27 @@ TEST_CASE("kappa = 0 is exactly the hair model and reads no table", "[bcsdf]") {
     p.eta = 1;
     CHECK(prepare(p, pack().view, lacking) == FurStatus::bad_eta);
     CHECK(total(near_lobes(lacking, 0.3f, -0.3f, 0.1f, 0.1f)) == 0);
+}
+
+TEST_CASE("any number of channels: each is what one channel gives alone", "[bcsdf]") {
+    constexpr FurParameters<7> seven = parameters_of<7>(*find_preset("deer"));
+    static_assert(seven.kappa == 0.91f && seven.sigma_ca[6] == 1.39f, "presets are constants");
+    FurParameters<7> p = seven;
+    for (int c = 0; c < 7; ++c) p.sigma_ca[c] = 0.3f * float(c * c);
+    FurFibre<7> all;
+    REQUIRE(prepare(p, pack().view, all) == FurStatus::ok);
+    for (int c = 0; c < 7; ++c) {
+        FurParameters<1> q = parameters_of<1>(*find_preset("deer"));
+        q.sigma_ca[0] = p.sigma_ca[c];
+        FurFibre<1> one;
+        REQUIRE(prepare(q, pack().view, one) == FurStatus::ok);
+        for (float phi : {0.2f, 2.9f}) {
+            CHECK(eval(all, 0.4f, -0.3f, phi, 0.1f).value[c] == eval(one, 0.4f, -0.3f, phi, 0.1f).value[0]);
+            // The far field skips scattered nodes by the brightest channel's energy.
+            CHECK(eval(all, 0.4f, -0.3f, phi, OffsetRange{}).value[c] ==
+                  Approx(eval(one, 0.4f, -0.3f, phi, OffsetRange{}).value[0]).epsilon(1e-6));
+        }
+    }
 }
 
 TEST_CASE("lobes integrate to their energies, and energies to at most 1", "[bcsdf]") {
@@ -194,6 +216,37 @@ TEST_CASE("near field is finite and non-negative at the ends of every range", "[
                             }
                     }
     CHECK(count > 200000);
+}
+
+TEST_CASE("each parameter's limit is where it goes to", "[bcsdf]") {
+    // Next to its limit, a fibre differs from the fibre at the limit by what the parameter's own size says.
+    const auto value = [](const FurParameters<3>& p, float theta_i, float h) {
+        FurFibre<3> fibre;
+        REQUIRE(prepare(p, pack().view, fibre) == FurStatus::ok);
+        return total(near_lobes(fibre, theta_i, -theta_i + 0.1f, 2.5f, h));
+    };
+    FurParameters<3> fur = parameters_of<3>(*find_preset("bobcat"));
+    for (float theta_i : {0.0f, 0.6f, 1.4f})
+        for (float h : {-0.6f, 0.2f}) {
+            const auto close = [&](auto&& set, float near, float at, double tolerance) {
+                FurParameters<3> a = fur, b = fur;
+                set(a, near), set(b, at);
+                CHECK(value(a, theta_i, h) == Approx(value(b, theta_i, h)).epsilon(tolerance).margin(tolerance));
+            };
+            // Up to 1 / cos theta_t = 1.25, chords of 4 and a factor of 10 from one lobe to their sum: 50 times the
+            // step.
+            close([](FurParameters<3>& p, float x) { p.sigma_ms = x; }, 1e-6f, 0, 5e-5);
+            close([](FurParameters<3>& p, float x) { p.sigma_ma = x; }, 1e-6f, 0, 5e-5);
+            close([](FurParameters<3>& p, float x) { p.sigma_ca[0] = x; }, 1e-6f, 0, 5e-5);
+            close([](FurParameters<3>& p, float x) { p.layers = x; }, 1e-6f, 0, 5e-5);
+            close([](FurParameters<3>& p, float x) { p.g = x; }, 1e-6f, 0, 5e-5);
+            close([](FurParameters<3>& p, float x) { p.kappa = x; }, 0.999999f, 1, 5e-3);  // s_m ~ a square root
+            if (h < 0 || theta_i > 0) continue;
+            // A medulla that ends before h / eta' is no longer seen at all; at h = 0, its chord is 2 kappa.
+            FurParameters<3> a = fur, b = fur;
+            a.kappa = 1e-6f, b.kappa = 0;
+            CHECK(value(a, theta_i, 0) == Approx(value(b, theta_i, 0)).epsilon(5e-5).margin(5e-5));
+        }
 }
 
 TEST_CASE("near field is continuous across its seams", "[bcsdf]") {

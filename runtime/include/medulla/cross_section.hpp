@@ -14,17 +14,21 @@ namespace medulla {
 /// What the inclination theta_i decides for a whole cross-section.
 template <class T>
 struct Inclination {
-    T cos_i;          ///< cos theta_i, > 0
-    T index_excess;   ///< eta'^2 - 1 = (eta^2 - 1) / cos^2 theta_i, > 0: no digits lost as eta -> 1
-    T inverse_index;  ///< 1 / eta', in (0, 1); eta' = sqrt(eta^2 - sin^2 theta_i) / cos theta_i (Bravais)
-    T inverse_cos_t;  ///< 1 / cos theta_t, sin theta_t = sin theta_i / eta
+    T cos_i;                 ///< cos theta_i, > 0
+    T index_excess;          ///< eta'^2 - 1 = (eta^2 - 1) / cos^2 theta_i, > 0: no digits lost as eta -> 1
+    T inverse_index;         ///< 1 / eta', in (0, 1); eta' = sqrt(eta^2 - sin^2 theta_i) / cos theta_i (Bravais)
+    T inverse_cos_t;         ///< 1 / cos theta_t, sin theta_t = sin theta_i / eta
+    T fresnel_index_excess;  ///< n^2 - 1 of the index n that the Fresnel terms see: eta' or, exact, eta
+    T fresnel_scale;         ///< their cosine of incidence over cos gamma_i: 1 or, exact, cos theta_i
 };
 
 template <class T>
-MEDULLA_FN Inclination<T> inclination(T eta, T cos_i) noexcept {
+MEDULLA_FN Inclination<T> inclination(T eta, T cos_i, Fresnel fresnel = Fresnel::bravais) noexcept {
     const T excess = (eta - T(1)) * (eta + T(1));
-    const T root = std::sqrt(excess + cos_i * cos_i);  // eta cos theta_t
-    return {cos_i, excess / (cos_i * cos_i), cos_i / root, eta / root};
+    const T root = square_root(excess + cos_i * cos_i);  // eta cos theta_t
+    const T excess_prime = excess / (cos_i * cos_i);
+    const bool exact = fresnel == Fresnel::exact;
+    return {cos_i, excess_prime, cos_i / root, eta / root, exact ? excess : excess_prime, exact ? cos_i : T(1)};
 }
 
 /// Reflectance F and transmittance 1 - F of the cuticle.
@@ -43,9 +47,10 @@ struct Path {
 };
 
 /// F_1 = mean over polarisations of R + (1-R)^2 R / (1-R^2) = 2R / (1+R), F = l F_1 / (1 + (l-1) F_1) (Eq. 13).
-/// Differences are expanded so that eta' -> 1 and cos gamma_i -> 0 lose no digits (docs/bcsdf.md, 'Fresnel').
+/// Differences are expanded so that n -> 1 and cos_i -> 0 lose no digits (docs/bcsdf.md, 'Fresnel').
 /// T is S, or several S abreast.
-/// @param cos_i cos gamma_i  @param x sqrt(index_excess + cos_i^2) = eta' cos gamma_t
+/// @param index_excess n^2 - 1  @param cos_i cosine of incidence
+/// @param x sqrt(index_excess + cos_i^2) = n times the cosine of refraction
 template <class T, class S>
 MEDULLA_FN Cuticle<T> cuticle(S layers, S index_excess, T cos_i, T x) noexcept {
     // Fewer layers than 1e-30 would be seen at h = 1 alone, where T1 is 0, and there 1 / (layers F1) may overflow.
@@ -76,11 +81,13 @@ MEDULLA_FN Path<T> trace(const Inclination<S>& at, S kappa, S layers, T h, T cos
     path.gamma_t = real_math::angle(sin_t, cos_t);
     const T s2 = (T(kappa) - sin_t) * (T(kappa) + sin_t);
     const auto inside = s2 > zero;
-    path.s_m = square_root(choose(inside, s2, zero));
+    path.s_m = choose(inside, square_root(choose(inside, s2, T(S(1)))), zero);  // no root of 0: it has no derivative
     // cos gamma_t - s_m = (1 - kappa^2) / (cos gamma_t + s_m) inside the medulla: exactly 0 for kappa = 1.
     const T sum = choose(inside, cos_t + path.s_m, T(S(1)));
     path.s_c = choose(inside, T((S(1) - kappa) * (S(1) + kappa)) / sum, cos_t);
-    path.cuticle = cuticle(layers, at.index_excess, cos_i, x);
+    // cos theta_i sqrt(eta'^2 - 1 + cos^2 gamma_i) = sqrt(eta^2 - 1 + (cos theta_i cos gamma_i)^2): one x serves both.
+    const T scale = T(at.fresnel_scale);
+    path.cuticle = cuticle(layers, at.fresnel_index_excess, scale * cos_i, scale * x);
     return path;
 }
 
@@ -99,25 +106,25 @@ MEDULLA_FN T scattered_centre(int p, T gamma_i, T gamma_t) noexcept {
 }
 
 /// What the inclination decides for attenuation: coefficients over cos theta_t and T_b of Eq. 20.
-template <int Channels>
+template <int Channels, class T = float>
 struct Absorption {
-    float medulla_extinction;  ///< (sigma_ma + sigma_ms) / cos theta_t
-    float medulla_scattering;  ///< sigma_ms / cos theta_t
-    float cortex[Channels];    ///< sigma_ca / cos theta_t
-    float T_b[Channels];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
+    T medulla_extinction;  ///< (sigma_ma + sigma_ms) / cos theta_t
+    T medulla_scattering;  ///< sigma_ms / cos theta_t
+    T cortex[Channels];    ///< sigma_ca / cos theta_t
+    T T_b[Channels];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
 };
 
 /// @param tabled the tables know what the medulla absorbs of scattered light: T_b leaves it out
-template <int Channels>
-MEDULLA_FN Absorption<Channels> absorption(const FurParameters<Channels>& p, float inverse_cos_t,
-                                           bool tabled = false) noexcept {
-    Absorption<Channels> a;
-    const float medulla = tabled ? 0.0f : p.kappa * p.sigma_ma * inverse_cos_t;
+template <int Channels, class T>
+MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, T>& p, T inverse_cos_t,
+                                              bool tabled = false) noexcept {
+    Absorption<Channels, T> a;
+    const T medulla = tabled ? T(0) : p.kappa * p.sigma_ma * inverse_cos_t;
     a.medulla_extinction = (p.sigma_ma + p.sigma_ms) * inverse_cos_t;
     a.medulla_scattering = p.sigma_ms * inverse_cos_t;
     for (int c = 0; c < Channels; ++c) {
         a.cortex[c] = p.sigma_ca[c] * inverse_cos_t;
-        a.T_b[c] = real_math::exponential(-(medulla + (1 - p.kappa) * a.cortex[c]));
+        a.T_b[c] = real_math::exponential(-(medulla + (T(1) - p.kappa) * a.cortex[c]));
     }
     return a;
 }
@@ -129,13 +136,14 @@ struct Energies {
     T A[lobe_count][Channels];
 };
 
-template <int Channels, class T>
-MEDULLA_FN Energies<Channels, T> energies(const Path<T>& path, const Absorption<Channels>& a, bool scattered) noexcept {
+template <int Channels, class T, class S>
+MEDULLA_FN Energies<Channels, T> energies(const Path<T>& path, const Absorption<Channels, S>& a,
+                                          bool scattered) noexcept {
     using real_math::exponential;
     Energies<Channels, T> e;
     const T F = path.cuticle.F, passed = path.cuticle.T_;
     const T m = exponential(-path.s_m * T(a.medulla_extinction));
-    const T E = scattered ? real_math::absorbed(path.s_m * T(2 * a.medulla_scattering)) : T(0.0f);
+    const T E = scattered ? real_math::absorbed(path.s_m * T(S(2) * a.medulla_scattering)) : T(S(0));
     for (int c = 0; c < Channels; ++c) {
         const T q = exponential(-path.s_c * T(a.cortex[c])), through = (q * m) * (q * m);
         const T s = passed * q * T(a.T_b[c]) * E;

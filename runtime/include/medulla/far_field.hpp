@@ -87,8 +87,8 @@ struct Offset {
 template <class T>
 MEDULLA_FN Offset<T> offset_inside(float rim, T psi) noexcept {
     const auto sc = real_math::sine_cosine(psi);
-    const T h = T(rim) * sc.sine;
-    return {h, square_root((T(1.0f) - h) * (T(1.0f) + h)), T(rim) * sc.cosine};
+    const T along = T(rim) * sc.cosine;  // 1 - h^2 without a difference that rounding could make negative
+    return {T(rim) * sc.sine, square_root(T((1 - rim) * (1 + rim)) + along * along), along};
 }
 template <class T>
 MEDULLA_FN Offset<T> offset_at_angle(T gamma) noexcept {
@@ -278,7 +278,8 @@ MEDULLA_FN float place_panel(FarField<Channels>& far, float a, float b, GaussRul
 }
 
 /// Nodes of the scattered lobes: 8 over psi for either side of an ordinary medulla, more where g makes the lobe narrow
-/// against its shift; in a dense medulla TRTs lives within 1 / tau of the rim in psi, which then has panels of its own.
+/// against its shift; in a dense medulla, or where F rises at the rim alone, TRTs lives near the rim in psi, which then
+/// has panels of its own.
 template <int Channels>
 MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
     const FurParameters<Channels>& parameters = far.fibre().parameters;
@@ -290,9 +291,13 @@ MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
     const int index = (width > 0.1f ? 0 : 1) + far.quality;
     const GaussRule rule = gauss_rule(index < 0 ? 0 : index), edge = gauss_rule(1);
     const float tau = far.near.longitudinal.absorption.medulla_extinction * parameters.kappa;
+    // Where the medulla reaches the fibre's rim, F rises to 1 within cos gamma_i ~ sqrt(eta'^2 - 1), times few layers.
+    const float steep = std::sqrt(far.near.longitudinal.at.index_excess) * std::fmin(1.0f, 2 * parameters.layers);
+    const float rise = far.rim < 1 ? 4.0f : std::fmax(3 * steep, 0.01f), dense = tau > 4 ? 4 / tau : 4.0f;
+    const float edge_width = std::fmin(rise, dense);
     float most = 0, low = a, high = b;
-    if (tau > 4) {
-        const float rim = float(pi / 2) - 4 / tau;
+    if (edge_width < 1) {
+        const float rim = float(pi / 2) - edge_width;
         if (a < -rim) low = b < -rim ? b : -rim, most = place_panel(far, a, low, edge);
         if (b > rim && b > low) high = low > rim ? low : rim, most = std::fmax(most, place_panel(far, high, b, edge));
     }

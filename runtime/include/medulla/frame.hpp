@@ -1,5 +1,5 @@
 // Directions in the fibre's frame and a pixel's coverage of the fibre: what lies between a renderer's vectors and
-// (theta, phi, h). Rests on the frame at the top of fur_fibre.hpp and on Eq. 27 of Yan et al. 2017.
+// (theta, phi, h). Rests on the frame at the top of medulla.hpp and on Eq. 27 of Yan et al. 2017.
 #pragma once
 
 #include <cmath>
@@ -7,6 +7,7 @@
 #include "medulla/config.hpp"
 #include "medulla/far_field.hpp"
 #include "medulla/fur_fibre.hpp"
+#include "medulla/sampling.hpp"
 
 namespace medulla {
 
@@ -66,6 +67,19 @@ MEDULLA_FN Colour<Channels> eval(const FurFibre<Channels>& fibre, Vector<float> 
                                  OffsetRange range) noexcept {
     const Angles<float> i = angles_of(omega_i), r = angles_of(omega_r);
     return eval(fibre, i.theta, r.theta, r.phi - i.phi, range);
+}
+
+/// Density per steradian of omega_r. @param sampler a NearSampler or FarSampler prepared at omega_i's inclination
+template <class Sampler>
+MEDULLA_FN float pdf(const Sampler& sampler, Vector<float> omega_i, Vector<float> omega_r) noexcept {
+    const Angles<float> i = angles_of(omega_i), r = angles_of(omega_r);
+    return sampler.pdf(r.theta, r.phi - i.phi);
+}
+
+/// omega_r of a sample that was drawn for omega_i.
+template <int Channels>
+MEDULLA_FN Vector<float> direction_of(const FurSample<Channels>& sample, Vector<float> omega_i) noexcept {
+    return direction_of(Angles<float>{sample.theta_r, sample.phi + angles_of(omega_i).phi});
 }
 
 }  // namespace medulla

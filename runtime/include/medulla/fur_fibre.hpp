@@ -1,16 +1,6 @@
 // The fur fibre in the near field: prepared once per material, then once per (theta_i, h), then any number of exits.
 // Rests on Yan et al. 2017, Sec. 4 with the errata of docs/bcsdf.md, and on the pack's C^M and C^N.
-//
-// Frame. The fibre runs along x; (y, z) is its cross-section. A direction has inclination theta = asin x in
-// [-pi/2, pi/2] and azimuth phi = atan2(z, y). omega_i points towards the light, omega_r to where light leaves,
-// phi = phi_r - phi_i: 0 is back towards the light, pi straight on. alpha > 0 turns R towards +x, so x points from tip
-// to root. h in [-1, 1] is the offset of the incoming ray along the left normal (counter-clockwise in (y, z)) of its
-// direction of travel -omega_i. 'i' is the direction that is known, with its h: the light's in light tracing; in path
-// tracing, by reciprocity, the camera ray's.
-//
-// Value. S = sum over lobes of M N / cos^2 theta_i (Eq. 12). L_r = integral of L_i S cos(theta_i) over solid angle, so
-// that in (theta, phi) the cosines cancel: sum M N is the density of the energy per radian^2 of (theta_r, phi), and
-// sum M N / cos theta_r that per steradian. Every M integrates to 1 over theta_r, every N to its A over phi.
+// Frame, value and measure stand at the top of medulla.hpp.
 #pragma once
 
 #include <cmath>
@@ -104,7 +94,9 @@ MEDULLA_FN bool same_axis(const TableView& a, std::uint32_t i, const TableView& 
     const PackAxis &x = a.layout.axes[i], &y = b.layout.axes[k];
     if (x.quantity != y.quantity || x.spans != y.spans) return false;
     const std::size_t bytes = (x.spans + 1 + 2 * ghost_knots) * sizeof(Knot<float>);
-    return std::memcmp(a.bytes + x.knots_offset, b.bytes + y.knots_offset, bytes) == 0;
+    for (std::size_t j = 0; j < bytes; ++j)  // no memcmp on a GPU
+        if (a.bytes[x.knots_offset + j] != b.bytes[y.knots_offset + j]) return false;
+    return true;
 }
 
 /// A material, ready to be asked. It borrows the pack's bytes, allocates nothing and is constant once prepared.
@@ -200,7 +192,7 @@ MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, 
     if (!(cos_i >= least_cosine)) return;
     m.valid = true;
     m.theta_i = theta_i;
-    m.at = inclination(fibre.parameters.eta, cos_i);
+    m.at = inclination(fibre.parameters.eta, cos_i, fibre.parameters.fresnel);
     m.absorption = absorption(fibre.parameters, m.at.inverse_cos_t, static_cast<bool>(fibre.survival));
     for (int p = 0; p < 3; ++p) m.gaussian[p] = truncated_gaussian(fibre.shift[p] - theta_i, fibre.deviation[p]);
     m.sigma = fibre.parameters.sigma_ms * fibre.parameters.kappa * m.at.inverse_cos_t;

@@ -9,20 +9,28 @@
 
 namespace medulla {
 
+/// Which reflectance R an interface has (docs/bcsdf.md, 'Fresnel').
+enum class Fresnel : int {
+    bravais,  ///< both polarisations of eta' at gamma_i, as Eq. 13 prints it; Table 4 was fitted with it
+    exact,    ///< a plane of index eta met at cos theta_i cos gamma_i (Marschner et al. 2003's eta', eta'')
+};
+
 /// One kind of fur. `sigma_ca` holds one value per colour channel; everything else is common to all of them.
-template <int Channels = 3>
+/// T is float; cross_section.hpp's formulas and unscattered_lobes take any other scalar too.
+template <int Channels = 3, class T = float>
 struct FurParameters {
     static_assert(Channels >= 1, "a colour has at least one channel");
-    float eta = 1.55f;              ///< refractive index of cortex and medulla [1], in (1, 10]
-    float kappa = 0;                ///< medullary index: medulla's radius [fibre radii], in [0, 1]; 0 = hair
-    float alpha = 0;                ///< tilt of the cuticle's scales [radians], in [-pi/2, pi/2]
-    float beta_m = 0.1f;            ///< longitudinal roughness, standard deviation [radians], in [1e-4, 4]
-    float beta_n = 0.1f;            ///< azimuthal roughness, standard deviation [radians], in [1e-4, 4]
-    float layers = 1;               ///< layers of the cuticle [1], in [0, 1000], need not be whole
-    float sigma_ms = 0;             ///< scattering coefficient of the medulla [1 / fibre radius], in [0, 1e9]
-    float sigma_ma = 0;             ///< absorption coefficient of the medulla [1 / fibre radius], in [0, 1e9]
-    float sigma_ca[Channels] = {};  ///< absorption coefficient of the cortex [1 / fibre radius], in [0, 1e9]
-    float g = 0;                    ///< mean cosine of the medulla's phase function [1], in (-1, 1)
+    T eta = T(1.55f);           ///< refractive index of cortex and medulla [1], in (1, 10]
+    T kappa = T(0);             ///< medullary index: medulla's radius [fibre radii], in [0, 1]; 0 = hair
+    T alpha = T(0);             ///< tilt of the cuticle's scales [radians], in [-pi/2, pi/2]
+    T beta_m = T(0.1f);         ///< longitudinal roughness, standard deviation [radians], in [1e-4, 4]
+    T beta_n = T(0.1f);         ///< azimuthal roughness, standard deviation [radians], in [1e-4, 4]
+    T layers = T(1);            ///< layers of the cuticle [1], in [0, 1000], need not be whole
+    T sigma_ms = T(0);          ///< scattering coefficient of the medulla [1 / fibre radius], in [0, 1e9]
+    T sigma_ma = T(0);          ///< absorption coefficient of the medulla [1 / fibre radius], in [0, 1e9]
+    T sigma_ca[Channels] = {};  ///< absorption coefficient of the cortex [1 / fibre radius], in [0, 1e9]
+    T g = T(0);                 ///< mean cosine of the medulla's phase function [1], in (-1, 1)
+    Fresnel fresnel = Fresnel::bravais;
 };
 
 /// The five lobes, in the order in which every array of lobes holds them.

@@ -17,7 +17,8 @@ namespace detail {
 template <class T>
 MEDULLA_FN T scaled_erfc(T x) noexcept {
     using std::erfc;
-    if (x < T(5)) return std::exp(x * x) * erfc(x);
+    using std::exp;
+    if (x < T(5)) return exp(x * x) * erfc(x);
     const T u = T(0.5) / (x * x);
     const T sum = T(1) - u * (T(1) - T(3) * u * (T(1) - T(5) * u * (T(1) - T(7) * u * (T(1) - T(9) * u))));
     return sum / (x * T(1.7724538509055160));
@@ -27,7 +28,8 @@ MEDULLA_FN T scaled_erfc(T x) noexcept {
 /// whose centre lies far outside the interval still has a mass that is no underflow.
 template <class T>
 MEDULLA_FN T scaled_tail_mass(T near, T w) noexcept {
-    constexpr T root_half = T(0.70710678118654752);
+    using std::exp;
+    const T root_half = T(0.70710678118654752);
     const T far = near + w;
     // Short against the tail's length 1 / far: the two tails would cancel, so the density is integrated by four Gauss
     // nodes, which are exact to float for an exponent that changes by at most 1.
@@ -37,11 +39,11 @@ MEDULLA_FN T scaled_tail_mass(T near, T w) noexcept {
         T sum = T(0);
         for (int i = 0; i < 2; ++i) {
             const T p = w * (T(0.5) + x[i]), q = w * (T(0.5) - x[i]);
-            sum += c[i] * (std::exp(-p * (near + T(0.5) * p)) + std::exp(-q * (near + T(0.5) * q)));
+            sum = sum + c[i] * (exp(-p * (near + T(0.5) * p)) + exp(-q * (near + T(0.5) * q)));
         }
         return sum * w * T(0.39894228040143268);
     }
-    const T tail = std::exp(T(-0.5) * w * (far + near));
+    const T tail = exp(T(-0.5) * w * (far + near));
     return T(0.5) * (scaled_erfc(near * root_half) - (tail > T(0) ? tail * scaled_erfc(far * root_half) : T(0)));
 }
 
@@ -78,14 +80,14 @@ struct TruncatedGaussian {
     T peak;       ///< density at the origin [1 / radian]
 
     MEDULLA_FN T pdf(T theta) const noexcept {
-        const T d = std::abs(theta - origin) * inverse;
+        const T d = magnitude(theta - origin) * inverse;
         return peak * real_math::exponential(T(-0.5) * d * (d + T(2) * beyond));
     }
 };
 
 template <class T>
 MEDULLA_FN TruncatedGaussian<T> truncated_gaussian(T centre, T deviation) noexcept {
-    constexpr T edge = T(pi / 2);
+    const T edge = T(pi / 2);
     const T inverse = T(1) / deviation, a = (-edge - centre) * inverse, b = (edge - centre) * inverse;
     const T density = T(0.39894228040143268) * inverse;
     // Both edges 6 deviations away: all but 2e-9 of the mass is inside, less than float can tell.
@@ -140,9 +142,7 @@ MEDULLA_FN T sample(const TruncatedGaussian<T>& gaussian, T u) noexcept {
 /// `x` less whole turns, in [-pi, pi]; |x| < 1e9.
 template <class T>
 MEDULLA_FN T wrap_angle(T x) noexcept {
-    constexpr T turn = T(2 * pi);
-    const T turns = x * T(1 / (2 * pi));
-    const T y = x - turn * T(static_cast<std::int32_t>(turns + (turns < T(0) ? T(-0.5) : T(0.5))));
+    const T y = x - T(2 * pi) * nearest_integer(x * T(1 / (2 * pi)));
     return y < T(-pi) ? T(-pi) : (y > T(pi) ? T(pi) : y);
 }
 
@@ -189,7 +189,7 @@ struct WrappedGaussian {
             sum = sum + V(power) * now;
             const V next = V(T(2)) * c * now - before;
             before = now, now = next;
-            power *= ratio, ratio *= d2;
+            power = power * ratio, ratio = ratio * d2;
         }
         return (V(T(1)) + V(T(2)) * sum) * V(T(1 / (2 * pi)));
     }
@@ -198,7 +198,8 @@ struct WrappedGaussian {
 template <class T>
 MEDULLA_FN WrappedGaussian<T> wrapped_gaussian(T deviation) noexcept {
     const T inverse = T(1) / deviation;
-    return {deviation, inverse, T(0.39894228040143268) * inverse, std::exp(T(-0.5) * deviation * deviation)};
+    using std::exp;
+    return {deviation, inverse, T(0.39894228040143268) * inverse, exp(T(-0.5) * deviation * deviation)};
 }
 
 /// Draws an angle from the centre of the wrapped Gaussian (Box and Muller 1958), in [-pi, pi].

@@ -1,5 +1,6 @@
 // Four floats side by side with the operators of one, so that the same formula runs for one offset or for four.
-// Rests on SSE2, which every x86-64 has; elsewhere plain arrays that a compiler may or may not join.
+// Rests on SSE2, which every x86-64 has; elsewhere, or with MEDULLA_NO_SIMD defined, plain arrays that a compiler may
+// or may not join.
 #pragma once
 
 #include <cmath>
@@ -8,7 +9,7 @@
 
 #include "medulla/config.hpp"
 
-#if defined(__SSE2__) && !defined(__CUDA_ARCH__) && !defined(__HIP_DEVICE_COMPILE__)
+#if defined(__SSE2__) && !defined(MEDULLA_NO_SIMD) && !defined(__CUDA_ARCH__) && !defined(__HIP_DEVICE_COMPILE__)
 #define MEDULLA_SSE2 1
 #include <emmintrin.h>
 #if defined(__AVX2__)
@@ -137,6 +138,15 @@ template <class T>
 MEDULLA_FN T square_root(T a) noexcept {
     using std::sqrt;
     return sqrt(a);
+}
+template <class T>
+MEDULLA_FN T magnitude(T a) noexcept {
+    return a < T(0) ? -a : a;
+}
+template <class T>
+MEDULLA_FN T nearest_integer(T a) noexcept {
+    using std::floor;
+    return floor(a + T(0.5));
 }
 MEDULLA_FN float magnitude(float a) noexcept { return a < 0 ? -a : a; }
 MEDULLA_FN float with_sign(float x, float y) noexcept { return y < 0 ? -magnitude(x) : magnitude(x); }

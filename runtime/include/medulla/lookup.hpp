@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <limits>
 
 #include "medulla/lanes.hpp"
 #include "medulla/pack.hpp"
@@ -152,6 +151,18 @@ MEDULLA_FN float row_sum(const TableView& table, std::uint32_t k, std::uint32_t 
     for (std::uint32_t first = from; first < to; first += rank_multiple)
         sum = plus(sum, times(load_eight(weight + first), convert_eight(bytes + row_bytes(first))));
     return sum_of(sum);
+}
+
+}  // namespace detail
+
+namespace detail {
+
+/// numeric_limits' own is no device function.
+MEDULLA_FN float not_a_number() noexcept {
+    const std::uint32_t bits = 0x7fc00000u;
+    float x;
+    std::memcpy(&x, &bits, sizeof x);
+    return x;
 }
 
 }  // namespace detail
@@ -315,7 +326,7 @@ MEDULLA_FN float survival(const PackView& pack, float sigma, float g, float h, f
 MEDULLA_FN float azimuthal(const PackView& pack, float sigma, float g, float h, float phi,
                            float absorption = 0) noexcept {
     const TableView& table = pack[TableKind::azimuthal];
-    if (!table) return std::numeric_limits<float>::quiet_NaN();
+    if (!table) return detail::not_a_number();
     const float side = h < 0 ? -1.0f : 1.0f;
     LobeQuery query;
     query.sigma = sigma, query.g = g, query.h = side * h, query.absorption = absorption;
@@ -330,7 +341,7 @@ enum class Side { back, forward };
 MEDULLA_FN float longitudinal(const PackView& pack, Side which, float sigma, float g, float theta_i,
                               float theta_r) noexcept {
     const TableView& table = pack[which == Side::back ? TableKind::longitudinal_back : TableKind::longitudinal_forward];
-    if (!table) return std::numeric_limits<float>::quiet_NaN();
+    if (!table) return detail::not_a_number();
     const float side = theta_i < 0 ? -1.0f : 1.0f;
     LobeQuery query;
     query.sigma = sigma, query.g = g, query.theta_i = side * theta_i;

@@ -1,5 +1,30 @@
 // medulla: the fur fibre's scattering core in any renderer. The only header to include; C++17, the standard library
 // alone; no allocation, no exceptions, no globals with constructors; every function is pure and thread-safe.
+//
+// Use.
+//   FurFibre<3> fibre;                              once per material
+//   prepare(parameters, open_pack(default_pack_words, default_pack_size).pack, fibre);
+//   eval(fibre, theta_i, theta_r, phi, h)           near field: a ray at offset h
+//   eval(fibre, theta_i, theta_r, phi, range)       mean over offsets; OffsetRange{} is the far field
+//   eval(fibre, omega_i, omega_r, h or range)       the same from directions in the fibre's frame
+//   NearField, FarField; NearSampler, FarSampler    the same, prepared for many exits; sample and pdf
+//
+// Frame. The fibre runs along x, from tip to root; (y, z) is its cross-section. A direction has inclination theta =
+// asin x in [-pi/2, pi/2] and azimuth phi = atan2(z, y), both in radians. omega_i points from the fibre to the light,
+// omega_r to where light leaves; phi = phi_r - phi_i: 0 is back towards the light, pi straight on. alpha > 0 turns R
+// towards +x. h in [-1, 1] is the offset of the incoming ray [fibre radii] along the left normal (counter-clockwise in
+// (y, z)) of its direction of travel -omega_i.
+//
+// i and r. 'i' is the direction that is known, with its h: the light's in light tracing; in path tracing, by
+// reciprocity, the camera ray's, and 'r' is what is drawn.
+//
+// Value. S = sum over lobes of M N / cos^2 theta_i (Eq. 12 of Yan et al. 2017). The cosine is the caller's, as with a
+// BSDF: L_r = integral over solid angle of L_i S cos(theta_i), cos(theta_i) = sqrt(1 - x^2) of omega_i.
+//
+// Measure. d omega = cos theta d theta d phi, so the cosines cancel in (theta, phi): sum M N is energy per radian^2 of
+// (theta_r, phi), sum M N / cos theta_r energy per steradian. Every M integrates to 1 over theta_r, every N to its
+// lobe's energy A over phi. `pdf_angular` is per radian^2, `pdf` per steradian; a sample's `weight` is sum M N /
+// pdf_angular: it multiplies a path's throughput as it is, no cosine is left to add.
 #pragma once
 
 #include "medulla/axis.hpp"
@@ -19,3 +44,4 @@
 #include "medulla/phase.hpp"
 #include "medulla/real_math.hpp"
 #include "medulla/sampling.hpp"
+#include "medulla/unscattered.hpp"

@@ -288,6 +288,15 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
 
 }  // namespace detail
 
+/// The tables of an open pack in a copy of its bytes that lies elsewhere, in a GPU's memory for one.
+inline PackView view_of_copy(const PackView& pack, const void* copy) noexcept {
+    PackView moved = pack;
+    moved.text = nullptr, moved.text_bytes = 0;
+    for (TableView& table : moved.tables)
+        if (table) table.bytes = static_cast<const unsigned char*>(copy);
+    return moved;
+}
+
 /// Checks every size, offset, axis, knot and number of a pack before anything is used, and gives views into it.
 /// Bytes need no alignment and must outlive the view. Takes about 1 ns per byte.
 inline OpenResult open_pack(const void* data, std::size_t size) noexcept {

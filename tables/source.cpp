@@ -1,9 +1,12 @@
 #include "tables/source.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 #include <cmath>
 #include <map>
 #include <mutex>
+#include <nlohmann/json.hpp>
 
 #include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
@@ -48,6 +51,15 @@ class TableSource : public Source {
             for (std::size_t b = 0; b < bins; ++b) out[b] = values[b / (bins / own)];
         }
         return out;
+    }
+
+    double noise(TableKind kind, const Parameters& at) const override {
+        const Table& table = *find(kind);
+        double noise = 0;
+        for_nodes(table, at, [&](std::size_t cell, double weight) {
+            noise += weight * table.standard_error[cell + (table.name == "longitudinal" ? side_of(kind) : 0)];
+        });
+        return std::abs(noise);
     }
 
     double back_fraction(const Parameters& at) const override {
@@ -108,6 +120,13 @@ class PackSource : public Source {
         const OpenResult opened = open_pack(bytes_.data(), bytes_.size());
         if (opened.status != PackStatus::ok) throw Error("{}: expected a pack: {}", path, describe(opened.status));
         pack_ = opened.pack;
+        const auto text = nlohmann::json::parse(pack_.text, pack_.text + pack_.text_bytes, nullptr, false);
+        for (const TableKind kind : lobe_kinds) {
+            const auto path =
+                nlohmann::json::json_pointer(fmt::format("/fit/{}/input_noise", medulla::tables::name_of(kind)));
+            const bool known = text.is_object() && text.contains(path) && text[path].is_number();
+            noise_[static_cast<std::size_t>(kind)] = known ? text[path].get<double>() : 0.0;
+        }
     }
 
     bool has(TableKind kind) const override { return static_cast<bool>(pack_[kind]); }
@@ -157,6 +176,8 @@ class PackSource : public Source {
         return out;
     }
 
+    double noise(TableKind kind, const Parameters&) const override { return noise_[static_cast<std::size_t>(kind)]; }
+
     double back_fraction(const Parameters& at) const override {
         const TableView& table = pack_[TableKind::back_fraction];
         if (!table) throw Error("the pack has no table of the slab's energies");
@@ -197,6 +218,7 @@ class PackSource : public Source {
 
     std::vector<unsigned char> bytes_;
     PackView pack_;
+    std::array<double, lobe_kinds.size()> noise_ = {};
     mutable std::mutex mutex_;
     mutable std::map<std::pair<TableKind, std::size_t>, std::vector<Point>> points_;
 };
@@ -299,11 +321,17 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
                 at.set(axes[k].name, axes[k].values[index % axes[k].size()]);
             return at;
         };
+        std::vector<double> noise(error.lobes), back_share(error.lobes, 0.0);
+        const bool shares = kind != TableKind::azimuthal && reference.has(TableKind::back_fraction) &&
+                            candidate.has(TableKind::back_fraction);
 #pragma omp parallel for schedule(static)
         for (std::size_t i = 0; i < error.lobes; ++i) {
             const Parameters at = parameters(i);
             const std::vector<double> a = reference.lobe(kind, at, bins);
             std::vector<double> b = candidate.lobe(kind, at, bins);
+            noise[i] = reference.noise(kind, at);
+            if (shares && at.sigma > 0)  // else there is no energy to share
+                back_share[i] = std::abs(candidate.back_fraction(at) - reference.back_fraction(at));
             const double width = (kind == TableKind::azimuthal ? 2 * pi : pi) / static_cast<double>(bins);
             double sum = 0, low = b[0];
             for (std::size_t j = 0; j < bins; ++j) {
@@ -313,18 +341,22 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
             }
             norm[i] = norm2(a), misfit[i] = norm2(b), energy[i] = std::abs(sum * width - 1), least[i] = low;
         }
-        double total = 0, total_misfit = 0;
+        double total = 0, total_misfit = 0, total_noise = 0;
         error.least = least[0];
         std::size_t worst = 0;
         for (std::size_t i = 0; i < error.lobes; ++i) {
             total += norm[i];
             total_misfit += misfit[i];
+            total_noise += norm[i] * noise[i] * noise[i];
+            error.worst_claim = std::max(error.worst_claim, std::sqrt(misfit[i] / norm[i] + noise[i] * noise[i]));
             error.energy = std::max(error.energy, energy[i]);
             error.least = std::min(error.least, least[i]);
             if (misfit[i] * norm[worst] > misfit[worst] * norm[i]) worst = i;
         }
         error.relative = std::sqrt(total_misfit / total);
         error.worst = std::sqrt(misfit[worst] / norm[worst]);
+        error.noise = std::sqrt(total_noise / total), error.claim = std::hypot(error.relative, error.noise);
+        error.back_share = *std::max_element(back_share.begin(), back_share.end());
         const Parameters at = parameters(worst);
         for (const Axis& axis : axes)
             error.worst_at += fmt::format("{}{} {:g}", error.worst_at.empty() ? "" : ", ", axis.name, at[axis.name]);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <mutex>
@@ -86,27 +87,25 @@ class TableSource : public Source {
     /// Calls f(first cell of the node, weight) for every node with a weight; longitudinal nodes own two cells.
     template <class F>
     void for_nodes(const Table& table, const Parameters& at, F f) const {
-        const std::vector<Axis> axes = parameters_of(table);
-        std::vector<Eigen::RowVectorXd> weights;
-        for (const Axis& axis : axes) {
+        std::vector<std::pair<std::size_t, double>> nodes = {{0, 1.0}};  // of the axes so far, and their weights
+        for (const Axis& axis : parameters_of(table)) {
             Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(axis.size()));
             const double x = at[axis.name];
-            bool exact = false;
-            for (std::size_t i = 0; i < axis.size(); ++i)
-                if (axis.values[i] == x) row[static_cast<Eigen::Index>(i)] = 1, exact = true;
+            const auto found = std::find(axis.values.begin(), axis.values.end(), x);
             const Spline& spline = splines_.at(table.name + axis.name);
-            if (!exact) row = spline.basis(spline_coordinate(quantity_of(axis.name), x)) * spline.from_nodes();
-            weights.push_back(row);
+            if (found != axis.values.end())
+                row[found - axis.values.begin()] = 1;
+            else
+                row = spline.basis(spline_coordinate(quantity_of(axis.name), x)) * spline.from_nodes();
+            std::vector<std::pair<std::size_t, double>> next;
+            for (const auto& [node, weight] : nodes)
+                for (std::size_t i = 0; i < axis.size(); ++i) {
+                    const double here = weight * row[static_cast<Eigen::Index>(i)];
+                    if (here != 0) next.emplace_back(node * axis.size() + i, here);
+                }
+            nodes = std::move(next);
         }
-        const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
-        const std::size_t nodes = table.cells() / sides;
-        for (std::size_t node = 0; node < nodes; ++node) {
-            double weight = 1;
-            std::size_t rest = node;
-            for (std::size_t k = axes.size(); k-- > 0; rest /= axes[k].size())
-                weight *= weights[k][static_cast<Eigen::Index>(rest % axes[k].size())];
-            if (weight != 0) f(node * sides, weight);
-        }
+        for (const auto& [node, weight] : nodes) f(node * (table.name == "longitudinal" ? 2 : 1), weight);
     }
 
     Tables tables_;

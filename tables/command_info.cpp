@@ -139,10 +139,6 @@ void verify_table(const Table& table, const std::string& path) {
     }
 }
 
-struct PackBalance {
-    double least = 0, energy = 0;
-};
-
 /// Greatest excess over [0, 1] of the share of the slab's light that leaves backward; NaN if one is.
 double share_excess(const Source& pack) {
     if (!pack.has(TableKind::back_fraction)) return 0;
@@ -180,9 +176,10 @@ void verify_survival(const Source& pack, const std::string& path) {
             }
 }
 
-/// Every node of a pack: finite, >= 0, integral 1 but for what holding at 0 adds; shares of energy in [0, 1].
-PackBalance verify_pack(const Source& pack, const std::string& path) {
-    PackBalance range;
+/// Every node of a pack: finite, >= 0, integral 1 but for what holding at 0 adds; shares of energy in [0, 1]. Returns
+/// its greatest error of an integral.
+double verify_pack(const Source& pack, const std::string& path) {
+    double energy = 0;
     const double excess = share_excess(pack);
     if (!(excess <= 0.5))
         throw Error("{}: {}: expected shares in [0, 1], found one off by {:.2e}", path,
@@ -191,18 +188,17 @@ PackBalance verify_pack(const Source& pack, const std::string& path) {
         if (!std::isfinite(error.energy) || !(error.least >= 0))
             throw Error("{}: {} lobes: expected finite densities >= 0, found {:g} (integral off by {:g})", path,
                         name_of(error.kind), error.least, error.energy);
-        range.energy = std::max(range.energy, error.energy);
-        range.least = std::min(range.least, error.least);
+        energy = std::max(energy, error.energy);
     }
     if (pack.absorbs()) verify_survival(pack, path);
     // A lobe is normalised before its dips below 0 are held there, so its integral exceeds 1 by what they hold. At half
     // of its energy the factors are no densities at all.
-    if (range.energy > 0.5)
-        throw Error("{}: expected lobes of integral 1, found one off by {:.2e}", path, range.energy);
-    return range;
+    if (energy > 0.5) throw Error("{}: expected lobes of integral 1, found one off by {:.2e}", path, energy);
+    return energy;
 }
 
 void run_verify(const FileWords& words) {
+    nlohmann::ordered_json json;
     for (const std::string& file : words.files) {
         if (is_tables(file)) {
             const Tables tables = read_tables(file);
@@ -211,14 +207,22 @@ void run_verify(const FileWords& words) {
                 verify_table(*table, file);
                 cells += table->cells();
             }
+            json[file] = {{"ok", true}, {"cells", cells}};
+            if (words.json) continue;
             fmt::print("{}: ok: SHA-256, {} cells finite and >= 0, integrals, energies and symmetry as they must be\n",
                        file, cells);
         } else {
-            const PackBalance range = verify_pack(*pack_source(read_pack(file), file), file);
+            const std::vector<unsigned char> bytes = read_pack(file);
+            const double energy = verify_pack(*pack_source(bytes, file), file);
+            const PackDegeneracy degeneracy = degeneracy_of(open_pack(bytes.data(), bytes.size()).pack);
+            json[file] = {{"ok", true}, {"energy_error", energy}, {"degeneracy", to_json(degeneracy)}};
+            if (words.json) continue;
             fmt::print("{}: ok: checksum, structure, lobes finite and >= 0; greatest integral error {:.1e}\n", file,
-                       range.energy);
+                       energy);
+            print(degeneracy);
         }
     }
+    if (words.json) fmt::print("{}\n", json.dump());
 }
 
 }  // namespace
@@ -240,6 +244,7 @@ void add_verify(CLI::App& app, Action& action) {
         app, action, "verify", "structure, checksums, energies, symmetry, finite, non-negative",
         [](CLI::App& command, FileWords& words) {
             command.add_option("FILE", words.files, "tables files and packs")->required();
+            command.add_flag("--json", words.json, "print one JSON object");
         },
         run_verify);
 }

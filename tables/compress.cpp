@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "tables/error.hpp"
@@ -257,7 +258,8 @@ TableReport report_of(const Solves& solves, std::size_t first, std::size_t last,
     report.fit_error = kind_error(solves, first, last);
     double spline = 0;
     for (std::size_t i = first; i < last; ++i) {
-        report.parts.push_back({solves[i].part->mirror, solves[i].result.report, solves[i].rank});
+        report.parts.push_back(
+            {solves[i].part->mirror, solves[i].result.report, solves[i].rank, solves[i].part->share});
         spline += solves[i].part->exit_error * solves[i].part->exit_error;
     }
     report.exit_error = std::sqrt(spline);
@@ -275,6 +277,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 CompressResult compress(const Tables& tables, const CompressOptions& options, const std::string& input) {
     const auto start = std::chrono::steady_clock::now();
+    const std::clock_t cpu_start = std::clock();
     const std::vector<Part> parts = (options.solver == tensor::Solver::nonnegative ? whole_lobes_of : parts_of)(
         tables, options.phi_spans, options.theta_spans);
     Solves solves;
@@ -293,6 +296,8 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
     }
     result.pack = write_pack(packed, provenance(tables, options, input, result.tables));
     result.solve_seconds = seconds_since(start);
+    result.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
+    result.degeneracy = degeneracy_of(open_pack(result.pack.data(), result.pack.size()).pack);
     result.errors = compare(*table_source(tables), *pack_source(result.pack, "the new pack"));
     result.seconds = seconds_since(start);
     return result;

@@ -1,10 +1,13 @@
 #include "tables/source.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <mutex>
+#include <nlohmann/json.hpp>
 
 #include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
@@ -53,6 +56,15 @@ class TableSource : public Source {
         return out;
     }
 
+    double noise(TableKind kind, const Parameters& at) const override {
+        const Table& table = *find(kind);
+        double noise = 0;
+        for_nodes(table, at, [&](std::size_t cell, double weight) {
+            noise += weight * table.standard_error[cell + (table.name == "longitudinal" ? side_of(kind) : 0)];
+        });
+        return std::abs(noise);
+    }
+
     double back_fraction(const Parameters& at) const override {
         const Table& table = *tables_.longitudinal;
         double back = 0, total = 0;
@@ -84,27 +96,25 @@ class TableSource : public Source {
     /// Calls f(first cell of the node, weight) for every node with a weight; longitudinal nodes own two cells.
     template <class F>
     void for_nodes(const Table& table, const Parameters& at, F f) const {
-        const std::vector<Axis> axes = parameters_of(table);
-        std::vector<Eigen::RowVectorXd> weights;
-        for (const Axis& axis : axes) {
+        std::vector<std::pair<std::size_t, double>> nodes = {{0, 1.0}};  // of the axes so far, and their weights
+        for (const Axis& axis : parameters_of(table)) {
             Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(axis.size()));
             const double x = at[axis.name];
-            bool exact = false;
-            for (std::size_t i = 0; i < axis.size(); ++i)
-                if (axis.values[i] == x) row[static_cast<Eigen::Index>(i)] = 1, exact = true;
+            const auto found = std::find(axis.values.begin(), axis.values.end(), x);
             const Spline& spline = splines_.at(table.name + axis.name);
-            if (!exact) row = spline.basis(spline_coordinate(quantity_of(axis.name), x)) * spline.from_nodes();
-            weights.push_back(row);
+            if (found != axis.values.end())
+                row[found - axis.values.begin()] = 1;
+            else
+                row = spline.basis(spline_coordinate(quantity_of(axis.name), x)) * spline.from_nodes();
+            std::vector<std::pair<std::size_t, double>> next;
+            for (const auto& [node, weight] : nodes)
+                for (std::size_t i = 0; i < axis.size(); ++i) {
+                    const double here = weight * row[static_cast<Eigen::Index>(i)];
+                    if (here != 0) next.emplace_back(node * axis.size() + i, here);
+                }
+            nodes = std::move(next);
         }
-        const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
-        const std::size_t nodes = table.cells() / sides;
-        for (std::size_t node = 0; node < nodes; ++node) {
-            double weight = 1;
-            std::size_t rest = node;
-            for (std::size_t k = axes.size(); k-- > 0; rest /= axes[k].size())
-                weight *= weights[k][static_cast<Eigen::Index>(rest % axes[k].size())];
-            if (weight != 0) f(node * sides, weight);
-        }
+        for (const auto& [node, weight] : nodes) f(node * (table.name == "longitudinal" ? 2 : 1), weight);
     }
 
     Tables tables_;
@@ -124,6 +134,13 @@ class PackSource : public Source {
         pack_ = opened.pack;
         for (const TableView& table : pack_.tables)
             if (table) check_nodes(table, path);
+        const auto text = nlohmann::json::parse(pack_.text, pack_.text + pack_.text_bytes, nullptr, false);
+        for (const TableKind kind : lobe_kinds) {
+            const auto path =
+                nlohmann::json::json_pointer(fmt::format("/fit/{}/input_noise", medulla::tables::name_of(kind)));
+            const bool known = text.is_object() && text.contains(path) && text[path].is_number();
+            noise_[static_cast<std::size_t>(kind)] = known ? text[path].get<double>() : 0.0;
+        }
     }
 
     bool has(TableKind kind) const override { return static_cast<bool>(pack_[kind]); }
@@ -172,6 +189,8 @@ class PackSource : public Source {
         }
         return out;
     }
+
+    double noise(TableKind kind, const Parameters&) const override { return noise_[static_cast<std::size_t>(kind)]; }
 
     double back_fraction(const Parameters& at) const override {
         const TableView& table = pack_[TableKind::back_fraction];
@@ -235,6 +254,7 @@ class PackSource : public Source {
 
     std::vector<unsigned char> bytes_;
     PackView pack_;
+    std::array<double, lobe_kinds.size()> noise_ = {};
     mutable std::mutex mutex_;
     mutable std::map<std::pair<TableKind, std::size_t>, std::vector<Point>> points_;
 };
@@ -349,11 +369,17 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
                 at.set(axes[k].name, axes[k].values[index % axes[k].size()]);
             return at;
         };
+        std::vector<double> noise(error.lobes), back_share(error.lobes, 0.0);
+        const bool shares = kind != TableKind::azimuthal && reference.has(TableKind::back_fraction) &&
+                            candidate.has(TableKind::back_fraction);
         const std::atomic<bool> never{false};
         in_parallel(error.lobes, 0, never, [&](std::size_t i) {
             const Parameters at = parameters(i);
             const std::vector<double> a = reference.lobe(kind, at, bins);
             std::vector<double> b = candidate.lobe(kind, at, bins);
+            noise[i] = reference.noise(kind, at);
+            if (shares && at.sigma > 0)  // else there is no energy to share
+                back_share[i] = std::abs(candidate.back_fraction(at) - reference.back_fraction(at));
             const double width = (kind == TableKind::azimuthal ? 2 * pi : pi) / static_cast<double>(bins);
             double sum = 0, low = b[0];
             for (std::size_t j = 0; j < bins; ++j) {
@@ -365,18 +391,22 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
             if (survives) survival[i] = std::abs(candidate.survival(at) - reference.survival(at));
         });
         if (survives) error.survival = *std::max_element(survival.begin(), survival.end());
-        double total = 0, total_misfit = 0;
+        double total = 0, total_misfit = 0, total_noise = 0;
         error.least = least[0];
         std::size_t worst = 0;
         for (std::size_t i = 0; i < error.lobes; ++i) {
             total += norm[i];
             total_misfit += misfit[i];
+            total_noise += norm[i] * noise[i] * noise[i];
+            error.worst_claim = std::max(error.worst_claim, std::sqrt(misfit[i] / norm[i] + noise[i] * noise[i]));
             error.energy = std::isnan(energy[i]) ? energy[i] : std::max(error.energy, energy[i]);  // a NaN stays
             error.least = std::min(error.least, least[i]);
             if (misfit[i] * norm[worst] > misfit[worst] * norm[i]) worst = i;
         }
         error.relative = std::sqrt(total_misfit / total);
         error.worst = std::sqrt(misfit[worst] / norm[worst]);
+        error.noise = std::sqrt(total_noise / total), error.claim = std::hypot(error.relative, error.noise);
+        error.back_share = *std::max_element(back_share.begin(), back_share.end());
         const Parameters at = parameters(worst);
         for (const Axis& axis : axes)
             error.worst_at += fmt::format("{}{} {:g}", error.worst_at.empty() ? "" : ", ", axis.name, at[axis.name]);

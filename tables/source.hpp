@@ -40,6 +40,9 @@ class Source {
     virtual std::size_t bins(TableKind kind) const = 0;
     /// Averages over `bins` equal bins of the normalised lobe [1/radian].
     virtual std::vector<double> lobe(TableKind kind, const Parameters& at, std::size_t bins) const = 0;
+    /// Relative L2 standard error of a lobe (between nodes: interpolated); of a pack, that of all lobes of the table it
+    /// was made from, as its provenance has it. 0 where nothing is known.
+    virtual double noise(TableKind kind, const Parameters& at) const = 0;
     /// Share of the slab's scattered energy that leaves backward.
     virtual double back_fraction(const Parameters& at) const = 0;
     /// Share of the disc's scattered energy that absorption leaves; 1 where there is no such axis.
@@ -72,6 +75,10 @@ struct LobeError {
     double least = 0;                ///< least value (bin average)
     std::optional<double> survival;  ///< greatest difference of survivals, where both have an axis of absorption
     std::size_t lobes = 0;
+    /// Relative L2 standard error of the reference. What the candidate is off from the truth by cannot be known better:
+    /// `claim` and `worst_claim` are the errors above with it added in squares.
+    double noise = 0, claim = 0, worst_claim = 0;
+    double back_share = 0;  ///< slab: greatest difference of the shares of energy that leave backward
 };
 std::vector<LobeError> compare(const Source& reference, const Source& candidate);
 

@@ -212,7 +212,14 @@ class Programs(unittest.TestCase):
             self.assertEqual(run("furtable", "verify", self.path(file))[0], 0)
             info = json.loads(run("furtable", "info", self.path(file), "--json")[1])
             self.assertIn("azimuthal", info["tables"])
-        errors = json.loads(run("furtable", "diff", self.path("t.h5"), self.path("t.furpack"), "--json")[1])["errors"]
+        diff = json.loads(run("furtable", "diff", self.path("t.h5"), self.path("t.furpack"), "--json")[1])
+        errors = diff["errors"]
+        for error in errors.values():  # nothing is claimed below the table's noise
+            self.assertGreater(error["noise"], 0)
+            self.assertGreaterEqual(error["relative_l2_with_noise"], max(error["noise"], error["relative_l2"]))
+        verified = json.loads(run("furtable", "verify", self.path("t.furpack"), "--json")[1])[self.path("t.furpack")]
+        self.assertEqual(verified["degeneracy"], diff["degeneracy"])
+        self.assertEqual(verified["energy_error"], max(e["energy_error"] for e in errors.values()))
         self.assertEqual(set(errors), {"azimuthal", "longitudinal back", "longitudinal forward"})
         same = json.loads(run("furtable", "diff", self.path("t.h5"), self.path("t.h5"), "--json")[1])["errors"]
         self.assertEqual(max(e["relative_l2"] for e in same.values()), 0)

@@ -85,6 +85,40 @@ TEST_CASE("unfolded lobes integrate to their energies, to the ends of every rang
         }
 }
 
+TEST_CASE("a batch of exits is its exits one by one", "[bcsdf]") {
+    std::mt19937 random(12);
+    const auto tables = std::make_unique<UnfoldedTables>();
+    for (const FurPreset& preset : fur_presets) {
+        FurParameters<3> p = parameters_of<3>(preset);
+        p.sigma_ca[1] *= 2, p.sigma_ca[2] *= 0.1f;
+        FurFibre<3> fibres[2];
+        REQUIRE(prepare(p, default_view(), fibres[0]) == FurStatus::ok);
+        REQUIRE(prepare(p, default_view(), fibres[1]) == FurStatus::ok);
+        REQUIRE(unfold(fibres[1], *tables));
+        for (int i = 0; i < 40; ++i) {
+            NearField<3> near;
+            const Query at = random_query(random);
+            near_field(fibres[i % 2], at.theta_i, i == 39 ? 1.5f : at.h, near);  // 1.5: not valid
+            constexpr int count = 53;
+            float theta_r[count], phi[count];
+            for (int k = 0; k < count; ++k) {
+                const Query q = random_query(random);
+                theta_r[k] = k == 7 ? 1.6f : q.theta_r, phi[k] = k == 9 ? std::nanf("") : (k == 11 ? 1e5f : q.phi);
+            }
+            Colour<3> S[count + 1];
+            S[count].value[0] = 42;
+            eval(near, count, theta_r, phi, S);
+            CHECK(S[count].value[0] == 42);
+            for (int k = 0; k < count; ++k) {
+                const Colour<3> one = near.eval(theta_r[k], phi[k]);
+                // The same sums in another order, and 1 / cos^2 as a factor: some ten roundings of 6e-8.
+                for (int c = 0; c < 3; ++c)
+                    CHECK(double(S[k].value[c]) == Approx(double(one.value[c])).epsilon(2e-6).margin(1e-12));
+            }
+        }
+    }
+}
+
 TEST_CASE("tables that do not fit are refused and change nothing", "[bcsdf]") {
     const auto tables = std::make_unique<UnfoldedTables>();
     FurParameters<3> p = parameters_of<3>(*find_preset("bobcat"));

@@ -55,6 +55,7 @@ inline Four power_of_two(Four k) noexcept {
     return Four(_mm_castsi128_ps(_mm_slli_epi32(_mm_add_epi32(n, _mm_set1_epi32(127)), 23)));
 }
 inline Four four_at(const float* x) noexcept { return Four(_mm_loadu_ps(x)); }
+inline void store_four(Four a, float* x) noexcept { _mm_storeu_ps(x, a.v); }
 /// Lane i in every lane.
 template <int i>
 inline Four spread(Four a) noexcept {
@@ -125,6 +126,9 @@ MEDULLA_FN Four power_of_two(Four k) noexcept {
     return each([&](int i) { return std::ldexp(1.0f, int(k.v[i])); });
 }
 MEDULLA_FN Four four_at(const float* x) noexcept { return Four(x[0], x[1], x[2], x[3]); }
+MEDULLA_FN void store_four(Four a, float* x) noexcept {
+    for (int i = 0; i < 4; ++i) x[i] = a.v[i];
+}
 /// Lane i in every lane.
 template <int i>
 MEDULLA_FN Four spread(Four a) noexcept {

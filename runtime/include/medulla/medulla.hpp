@@ -8,6 +8,7 @@
 //   eval(fibre, theta_i, theta_r, phi, h)           near field: a ray at offset h
 //   eval(fibre, theta_i, theta_r, phi, range)       mean over offsets; OffsetRange{} is the far field
 //   eval(fibre, omega_i, omega_r, h or range)       the same from directions in the fibre's frame
+//   eval(near, count, theta_r, phi, S)              many exits of a NearField at once
 //   NearField, FarField; NearSampler, FarSampler    the same, prepared for many exits; sample and pdf
 //
 // Frame. The fibre runs along x, from tip to root; (y, z) is its cross-section. A direction has inclination theta =
@@ -29,6 +30,7 @@
 #pragma once
 
 #include "medulla/axis.hpp"
+#include "medulla/batch.hpp"
 #include "medulla/config.hpp"
 #include "medulla/cross_section.hpp"
 #include "medulla/default_pack.hpp"

@@ -164,12 +164,17 @@ struct UnfoldedTables {
         return {azimuthal + std::size_t(row.first) * 8 * azimuth_rows(), row.weight, sigma,
                 total > 1e-30f && total < 1e30f ? 1 / total : 0.0f};
     }
-    /// Density per radian at exit y [radians, |y| < 1e9], >= 0.
-    MEDULLA_HOT float azimuthal_density(const AzimuthalPoint& p, float y) const noexcept {
+    /// Where exit y lies among an azimuthal point's rows. @param y [radians], |y| < 1e9
+    MEDULLA_HOT RowPoint azimuth_exit(float y) const noexcept {
         const float x = y - float(2 * pi) * nearest_integer(y * float(1 / (2 * pi)));
         const RowPoint exit = azimuth.at(x < 0 ? -x : x);
+        const std::uint32_t other = 0u - std::uint32_t(x < 0);  // no branch on a sign
+        return {4 * (exit.first + (azimuth_rows() & other)), exit.weight};
+    }
+    /// Density per radian at an exit, >= 0.
+    MEDULLA_HOT float azimuthal_density(const AzimuthalPoint& p, const RowPoint& exit) const noexcept {
         const std::uint32_t step = 4 * azimuth_rows();
-        const float* row = p.rows + 4 * exit.first + (step & (0u - std::uint32_t(x < 0)));  // no branch on a sign
+        const float* row = p.rows + exit.first;
         // h first: its weights are known before the exit's.
         const auto blend = [&](const float* r) {
             return (spread<0>(p.offset) * four_at(r) + spread<1>(p.offset) * four_at(r + 2 * step)) +
@@ -180,16 +185,24 @@ struct UnfoldedTables {
         const float value = sum_of(sum * p.sigma) * p.inverse_integral;
         return value < 0 ? 0.0f : value;
     }
+    MEDULLA_HOT float azimuthal_density(const AzimuthalPoint& p, float y) const noexcept {
+        return azimuthal_density(p, azimuth_exit(y));
+    }
     /// @param theta_i [radians], in [0, pi/2]
     MEDULLA_HOT LongitudinalPoint longitudinal_at(float theta_i) const noexcept {
         const RowPoint row = inclination.at(spline_coordinate(Quantity::theta_i, theta_i));
         return {longitudinal + std::size_t(row.first) * 4 * longitude_rows(), row.weight};
     }
-    /// Densities per radian at exit y in [-pi/2, pi/2], >= 0.
-    MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, float y) const noexcept {
+    /// Where exit y lies among a longitudinal point's rows. @param y [radians], in [-pi/2, pi/2]
+    MEDULLA_HOT RowPoint longitude_exit(float y) const noexcept {
         const RowPoint exit = longitude.at(y < 0 ? -y : y);
+        const std::uint32_t other = 0u - std::uint32_t(y < 0);
+        return {2 * (exit.first + (longitude_rows() & other)), exit.weight};
+    }
+    /// Densities per radian at an exit, >= 0.
+    MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, const RowPoint& exit) const noexcept {
         const std::uint32_t step = 2 * longitude_rows();
-        const float* row = p.rows + 2 * exit.first + (step & (0u - std::uint32_t(y < 0)));
+        const float* row = p.rows + exit.first;
         const auto blend = [&](const float* r) {
             return (spread<0>(p.weight) * four_at(r) + spread<1>(p.weight) * four_at(r + 2 * step)) +
                    (spread<2>(p.weight) * four_at(r + 4 * step) + spread<3>(p.weight) * four_at(r + 6 * step));
@@ -197,6 +210,9 @@ struct UnfoldedTables {
         const Four sum = lower_twice(exit.weight) * blend(row) + upper_twice(exit.weight) * blend(row + 4);
         const float back = lane(sum, 0) + lane(sum, 2), forward = lane(sum, 1) + lane(sum, 3);
         return {back < 0 ? 0.0f : back, forward < 0 ? 0.0f : forward};
+    }
+    MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, float y) const noexcept {
+        return longitudinal_density(p, longitude_exit(y));
     }
 };
 

@@ -186,10 +186,11 @@ void print(const std::vector<LobeError>& errors) {
         if (error.survival)
             fmt::print("{}: greatest error of the share that absorption leaves {:.1e}\n", name_of(error.kind),
                        *error.survival);
-    if (error.noise > 0)
-        fmt::print("{}: the reference's noise is {:.1e}; with it {:.3e}, worst lobe {:.3e}{}\n", name_of(error.kind),
-                   error.noise, error.claim, error.worst_claim,
-                   error.relative < error.noise ? ": no error below the noise is known" : "");
+    for (const LobeError& error : errors)
+        if (error.noise > 0)
+            fmt::print("{}: the reference's noise is {:.1e}; with it {:.3e}, worst lobe {:.3e}{}\n",
+                       name_of(error.kind), error.noise, error.claim, error.worst_claim,
+                       error.relative < error.noise ? ": no error below the noise is known" : "");
     for (const LobeError& error : errors)
         if (error.kind == TableKind::longitudinal_back)
             fmt::print("share of energy that leaves backward: off by at most {:.1e}\n", error.back_share);

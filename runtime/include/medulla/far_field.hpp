@@ -67,7 +67,8 @@ struct FarField {
     detail::Cuts cuts[3];                 ///< of R, TT, TRT
     int nodes = 0;                        ///< scattering nodes
     ScatteringNode<Channels> node[most_scattering_nodes];
-    float sigma_weight[max_rank];  ///< azimuthal table contracted to this theta_i's sigma and absorption
+    Four sigma_point;              ///< where sigma lies in unfolded tables, if the fibre has them
+    float sigma_weight[max_rank];  ///< else the azimuthal table contracted to it and to the absorption
 
     MEDULLA_FN const FurFibre<Channels>& fibre() const noexcept { return *near.fibre; }
     MEDULLA_FN LobeValues<Channels> lobes(float theta_r, float phi) const noexcept;
@@ -220,24 +221,23 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
     }
 }
 
-/// Cuts of lobe p over [gamma_low, gamma_high].
+/// Cuts of R, TT and TRT over [gamma_low, gamma_high].
 template <int Channels>
-MEDULLA_FN void place_cuts(FarField<Channels>& far, int p) noexcept {
+MEDULLA_FN void place_cuts(FarField<Channels>& far) noexcept {
     const Inclination<float>& at = far.near.longitudinal.at;
-    Cuts& cuts = far.cuts[p];
     const float low = far.gamma_low, high = far.gamma_high;
-    cuts.count = 0;
+    Cuts cuts;
     const auto both = [&](float gamma) { cuts.insert(gamma, low, high), cuts.insert(-gamma, low, high); };
+    const auto both_at = [&](float c) { both(real_math::angle(std::sqrt((1 - c) * (1 + c)), c)); };
     // The cuticle's F changes over cos gamma_i ~ sqrt(eta'^2 - 1) as eta' -> 1, and ~ 1 / eta' as eta' -> infinity.
     const float scale = std::fmin(std::sqrt(at.index_excess), at.inverse_index);
-    for (float c = 2 * scale; c < 0.7f; c *= 4) both(real_math::angle(std::sqrt((1 - c) * (1 + c)), c));
+    for (float c = 2 * scale; c < 0.7f; c *= 4) both_at(c);
     if (far.rim < 1 && far.fibre().parameters.kappa > 0) both(far.gamma_rim);
-    // TRT is stationary where cos^2 gamma_i = (eta'^2 - 1) / 3.
-    if (p == 2 && at.index_excess < 3) {
-        const float c = std::sqrt(at.index_excess / 3);
-        both(real_math::angle(std::sqrt((1 - c) * (1 + c)), c));
-    }
     cuts.insert(low, low - 1, high), cuts.insert(high, low, high + 1);
+    far.cuts[0] = far.cuts[1] = cuts;
+    // TRT is stationary where cos^2 gamma_i = (eta'^2 - 1) / 3.
+    if (at.index_excess < 3) both_at(std::sqrt(at.index_excess / 3));
+    far.cuts[2] = cuts;
 }
 
 /// Nodes of one panel [a, b] in psi; returns the largest energy among them.
@@ -347,11 +347,15 @@ MEDULLA_FN void far_field(const FurFibre<Channels>& fibre, float theta_i, Offset
     const float rim = fibre.parameters.kappa / at.inverse_index;
     far.rim = rim < 1 ? rim : 1.0f;
     far.gamma_rim = angle(far.rim);
-    for (int p = 0; p < 3; ++p) detail::place_cuts(far, p);
+    detail::place_cuts(far);
     if (!fibre.scattered) return;
-    const float* weight = weights_at(fibre.azimuthal, far.near.longitudinal.absorbed, far.sigma_weight);
-    contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, far.near.longitudinal.sigma, weight,
-                  far.sigma_weight);
+    const float sigma = far.near.longitudinal.sigma;
+    if (fibre.tables != nullptr) {
+        far.sigma_point = fibre.tables->sigma_at(sigma);
+    } else {
+        const float* weight = weights_at(fibre.azimuthal, far.near.longitudinal.absorbed, far.sigma_weight);
+        contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, sigma, weight, far.sigma_weight);
+    }
     detail::place_scattering_nodes(far);
 }
 
@@ -383,9 +387,18 @@ MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, floa
     for (int p = 0; p < 2; ++p)
         for (int c = 0; c < Channels; ++c) N[p][c] = 0;
     const MaterialTable& table = far.fibre().azimuthal;
+    const UnfoldedTables* unfolded = far.fibre().tables;
     Contraction contraction;
     for (int i = 0; i < far.nodes; ++i) {
         const ScatteringNode<Channels>& n = far.node[i];
+        if (unfolded != nullptr) {
+            const AzimuthalPoint at = unfolded->azimuthal_at(far.sigma_point, n.offset);
+            for (int p = 0; p < 2; ++p) {
+                const float D = unfolded->azimuthal_density(at, n.side * (phi - n.centre[p]));
+                for (int c = 0; c < Channels; ++c) N[p][c] += n.A[p][c] * D;
+            }
+            continue;
+        }
         contract_axis(table.view, table.last_axis, last_point(table, n.offset), far.sigma_weight, contraction.weight);
         contraction.inverse_integral = inverse_integral(table.view, contraction.weight);
         for (int p = 0; p < 2; ++p) {

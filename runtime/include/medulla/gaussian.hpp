@@ -79,9 +79,12 @@ struct TruncatedGaussian {
     T beyond;     ///< how far the centre lies beyond the edge [deviations], 0 where it is inside
     T peak;       ///< density at the origin [1 / radian]
 
-    MEDULLA_FN T pdf(T theta) const noexcept {
-        const T d = magnitude(theta - origin) * inverse;
-        return peak * real_math::exponential(T(-0.5) * d * (d + T(2) * beyond));
+    MEDULLA_FN T pdf(T theta) const noexcept { return pdf_of(theta); }
+    /// Density at several inclinations abreast.
+    template <class V>
+    MEDULLA_FN V pdf_of(V theta) const noexcept {
+        const V d = magnitude(theta - V(origin)) * V(inverse);
+        return V(peak) * real_math::exponential(V(T(-0.5)) * d * (d + V(T(2) * beyond)));
     }
 };
 

@@ -54,6 +54,16 @@ inline Four power_of_two(Four k) noexcept {
     const __m128i n = _mm_cvtps_epi32(k.v);
     return Four(_mm_castsi128_ps(_mm_slli_epi32(_mm_add_epi32(n, _mm_set1_epi32(127)), 23)));
 }
+inline Four four_at(const float* x) noexcept { return Four(_mm_loadu_ps(x)); }
+inline void store_four(Four a, float* x) noexcept { _mm_storeu_ps(x, a.v); }
+/// Lane i in every lane.
+template <int i>
+inline Four spread(Four a) noexcept {
+    return Four(_mm_shuffle_ps(a.v, a.v, i * 0x55));
+}
+/// Lanes 0 0 1 1 and 2 2 3 3.
+inline Four lower_twice(Four a) noexcept { return Four(_mm_unpacklo_ps(a.v, a.v)); }
+inline Four upper_twice(Four a) noexcept { return Four(_mm_unpackhi_ps(a.v, a.v)); }
 inline float lane(Four a, int i) noexcept {
     alignas(16) float x[4];
     _mm_store_ps(x, a.v);
@@ -115,6 +125,18 @@ MEDULLA_FN Four nearest_integer(Four a) noexcept {
 MEDULLA_FN Four power_of_two(Four k) noexcept {
     return each([&](int i) { return std::ldexp(1.0f, int(k.v[i])); });
 }
+MEDULLA_FN Four four_at(const float* x) noexcept { return Four(x[0], x[1], x[2], x[3]); }
+MEDULLA_FN void store_four(Four a, float* x) noexcept {
+    for (int i = 0; i < 4; ++i) x[i] = a.v[i];
+}
+/// Lane i in every lane.
+template <int i>
+MEDULLA_FN Four spread(Four a) noexcept {
+    return Four(a.v[i]);
+}
+/// Lanes 0 0 1 1 and 2 2 3 3.
+MEDULLA_FN Four lower_twice(Four a) noexcept { return Four(a.v[0], a.v[0], a.v[1], a.v[1]); }
+MEDULLA_FN Four upper_twice(Four a) noexcept { return Four(a.v[2], a.v[2], a.v[3], a.v[3]); }
 MEDULLA_FN float lane(Four a, int i) noexcept { return a.v[i]; }
 MEDULLA_FN float sum_of(Four a) noexcept { return (a.v[0] + a.v[2]) + (a.v[1] + a.v[3]); }
 #endif
@@ -150,7 +172,11 @@ MEDULLA_FN T nearest_integer(T a) noexcept {
 }
 MEDULLA_FN float magnitude(float a) noexcept { return a < 0 ? -a : a; }
 MEDULLA_FN float with_sign(float x, float y) noexcept { return y < 0 ? -magnitude(x) : magnitude(x); }
+#if defined(MEDULLA_SSE2)
+inline float nearest_integer(float a) noexcept { return float(_mm_cvtss_si32(_mm_set_ss(a))); }  // no branch on a sign
+#else
 MEDULLA_FN float nearest_integer(float a) noexcept { return float(std::int32_t(a + (a < 0 ? -0.5f : 0.5f))); }
+#endif
 MEDULLA_FN float power_of_two(float k) noexcept {
     const std::int32_t bits = (std::int32_t(k) + 127) * 8388608;  // 2^23
     float x;

@@ -204,6 +204,15 @@ MEDULLA_HOT void contract_axis(const TableView& table, std::uint32_t k, const Ax
         detail::store_eight(detail::times(detail::load_eight(from + first), factor), to + first);
     }
 }
+/// to[r] = from[r] * (row `row` of axis k)[r].
+MEDULLA_FN void scale_by_row(const TableView& table, std::uint32_t k, std::uint32_t row, const float* from,
+                             float* to) noexcept {
+    const unsigned char* bytes = table.row(k, row);
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple)
+        detail::store_eight(
+            detail::times(detail::load_eight(from + first), detail::convert_eight(bytes + row_bytes(first))),
+            to + first);
+}
 MEDULLA_FN void contract_axis(const TableView& table, std::uint32_t k, float x, const float* from, float* to) noexcept {
     contract_axis(table, k, axis_point(table, k, x), from, to);
 }

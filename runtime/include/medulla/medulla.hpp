@@ -4,9 +4,11 @@
 // Use.
 //   FurFibre<3> fibre;                              once per material
 //   prepare(parameters, open_pack(default_pack_words, default_pack_size).pack, fibre);
+//   UnfoldedTables tables; unfold(fibre, tables);   optional, 133 KB a material: lookups at a tenth of the time
 //   eval(fibre, theta_i, theta_r, phi, h)           near field: a ray at offset h
 //   eval(fibre, theta_i, theta_r, phi, range)       mean over offsets; OffsetRange{} is the far field
 //   eval(fibre, omega_i, omega_r, h or range)       the same from directions in the fibre's frame
+//   eval(near, count, theta_r, phi, S)              many exits of a NearField at once
 //   NearField, FarField; NearSampler, FarSampler    the same, prepared for many exits; sample and pdf
 //
 // Frame. The fibre runs along x, from tip to root; (y, z) is its cross-section. A direction has inclination theta =
@@ -28,6 +30,7 @@
 #pragma once
 
 #include "medulla/axis.hpp"
+#include "medulla/batch.hpp"
 #include "medulla/config.hpp"
 #include "medulla/cross_section.hpp"
 #include "medulla/default_pack.hpp"
@@ -45,4 +48,5 @@
 #include "medulla/phase.hpp"
 #include "medulla/real_math.hpp"
 #include "medulla/sampling.hpp"
+#include "medulla/unfolded.hpp"
 #include "medulla/unscattered.hpp"

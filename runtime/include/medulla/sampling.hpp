@@ -92,8 +92,11 @@ struct LongitudinalSampler {
     template <int Channels>
     MEDULLA_FN void prepare(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m) noexcept {
         side = m.theta_i < 0 ? -1.0f : 1.0f;
-        distribute(fibre.back.view, m.back, back);
-        distribute(fibre.forward.view, m.forward, forward);
+        Contraction contracted;
+        contract(fibre.back, m.sigma, side * m.theta_i, contracted);
+        distribute(fibre.back.view, contracted, back);
+        contract(fibre.forward, m.sigma, side * m.theta_i, contracted);
+        distribute(fibre.forward.view, contracted, forward);
     }
     /// Density of theta_r given phi, both sides blended as M^s is.
     MEDULLA_FN float pdf(float theta_r, float phi) const noexcept {
@@ -122,7 +125,10 @@ struct NearSampler {
         for (int c = 0; !field.scattered && c < Channels; ++c) energy.A[3][c] = energy.A[4][c] = 0;
         shares = detail::lobe_shares(energy);
         if (!field.scattered) return;
-        distribute(field.fibre->azimuthal.view, field.azimuthal, azimuth);
+        const MaterialTable& table = field.fibre->azimuthal;
+        Contraction contracted;
+        contract(table, field.longitudinal.sigma, field.offset, contracted);
+        distribute(table.view, contracted, azimuth);
         longitude.prepare(*field.fibre, field.longitudinal);
     }
 
@@ -212,7 +218,9 @@ MEDULLA_FN void FarSampler<Channels>::prepare(const FarField<Channels>& field) n
     const FurFibre<Channels>& fibre = field.fibre();
     const MaterialTable& table = fibre.azimuthal;
     const std::uint32_t stride = table.view.layout.rank_stride;
-    Contraction mean_lobe[2], at;
+    Contraction mean_lobe[2], at_sigma, at;
+    const float* weight = weights_at(table, field.near.longitudinal.absorbed, at_sigma.weight);
+    contract_axis(table.view, table.sigma_axis, field.near.longitudinal.sigma, weight, at_sigma.weight);
     float energy[2] = {}, moment[2][2] = {};
     for (auto& lobe : mean_lobe)
         for (std::uint32_t r = 0; r < stride; ++r) lobe.weight[r] = 0;
@@ -220,7 +228,7 @@ MEDULLA_FN void FarSampler<Channels>::prepare(const FarField<Channels>& field) n
         const ScatteringNode<Channels>& n = field.node[i];
         const int side = n.side < 0 ? 0 : 1;
         const float A = detail::mean(n.A[0]) + detail::mean(n.A[1]);
-        contract_axis(table.view, table.last_axis, n.offset, field.sigma_weight, at.weight);
+        contract_axis(table.view, table.last_axis, n.offset, at_sigma.weight, at.weight);
         const float factor = A * inverse_integral(table.view, at.weight);
         for (std::uint32_t r = 0; r < stride; ++r) mean_lobe[side].weight[r] += factor * at.weight[r];
         energy[side] += A;

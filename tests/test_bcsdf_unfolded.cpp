@@ -1,0 +1,161 @@
+// Unfolded tables against the factors they were multiplied out from: the fast path and its slow twin.
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "analytic_pack.hpp"
+#include "medulla/medulla.hpp"
+
+using namespace medulla;
+
+namespace {
+
+const PackView& default_view() {
+    static const PackView view = open_pack(default_pack_words, default_pack_size).pack;
+    return view;
+}
+
+struct Query {
+    float theta_i, theta_r, phi, h;
+};
+
+Query random_query(std::mt19937& random) {
+    std::uniform_real_distribution<float> u(0, 1);
+    const float theta_i = 3.1415f * (u(random) - 0.5f), around = 1.2f * (u(random) - 0.5f) - theta_i;
+    return {theta_i, std::max(-1.5707f, std::min(1.5707f, around)), 12.5f * (u(random) - 0.5f), 2 * u(random) - 1};
+}
+
+}  // namespace
+
+TEST_CASE("unfolded tables say what the factors say, near and far", "[bcsdf]") {
+    std::mt19937 random(11);
+    const auto tables = std::make_unique<UnfoldedTables>();
+    for (const FurPreset& preset : fur_presets) {
+        FurFibre<3> slow;
+        REQUIRE(prepare(parameters_of<3>(preset), default_view(), slow) == FurStatus::ok);
+        FurFibre<3> fast = slow;
+        REQUIRE(unfold(fast, *tables));
+        REQUIRE(fast.tables == tables.get());
+        double error[3] = {}, norm[3] = {};
+        const auto add = [&](int i, float a, float b) {
+            error[i] += std::pow(double(a) - double(b), 2), norm[i] += std::pow(double(b), 2);
+        };
+        for (int i = 0; i < 1500; ++i) {
+            const Query q = random_query(random);
+            const auto a = near_lobes(fast, q.theta_i, q.theta_r, q.phi, q.h),
+                       b = near_lobes(slow, q.theta_i, q.theta_r, q.phi, q.h);
+            for (int k = 0; k < 3; ++k) CHECK((a.M[k] == b.M[k] && a.N[k][0] == b.N[k][0]));  // the same code
+            add(0, a.M[3], b.M[3]);
+            for (int k = 3; k < 5; ++k) add(1, a.N[k][0], b.N[k][0]);
+            if (i % 50) continue;
+            FarField<3> far_fast, far_slow;
+            far_field(fast, q.theta_i, OffsetRange{}, far_fast), far_field(slow, q.theta_i, OffsetRange{}, far_slow);
+            const auto c = far_fast.lobes(q.theta_r, q.phi), d = far_slow.lobes(q.theta_r, q.phi);
+            for (int k = 3; k < 5; ++k) add(2, c.N[k][0], d.N[k][0]);
+        }
+        // A tenth of the pack's own error (2e-3, docs/accuracy.md), of which it then makes 0.5 % more.
+        for (int i = 0; i < 3; ++i) CHECK(std::sqrt(error[i] / norm[i]) < 2e-4);
+    }
+}
+
+TEST_CASE("unfolded lobes integrate to their energies, to the ends of every range", "[bcsdf]") {
+    const auto tables = std::make_unique<UnfoldedTables>();
+    FurFibre<3> fibre;
+    REQUIRE(prepare(parameters_of<3>(*find_preset("cat")), default_view(), fibre) == FurStatus::ok);
+    REQUIRE(unfold(fibre, *tables));
+    for (float theta_i : {0.0f, 1e-30f, -0.8f, 1.5f, -1.5707962f})
+        for (float h : {0.0f, 1e-20f, -0.4f, 0.99999994f, 1.0f, -1.0f}) {
+            NearField<3> near;
+            near_field(fibre, theta_i, h, near);
+            constexpr int n = 1440;  // even steps: exact where the lobe is wide, 1e-3 where its peak has 0.5 degrees
+            double N[2] = {}, M = 0;
+            for (int i = 0; i < n; ++i) {
+                const auto l = near.lobes(float(pi * (i + 0.5) / n - pi / 2), float(2 * pi * (i + 0.5) / n - pi));
+                for (int k = 0; k < 2; ++k) N[k] += double(l.N[3 + k][0]) * 2 * pi / n;
+                CHECK(l.M[3] >= 0);
+            }
+            for (int i = 0; i < n; ++i) M += double(near.lobes(float(pi * (i + 0.5) / n - pi / 2), 1.0f).M[3]) * pi / n;
+            if (!near.scattered) continue;
+            for (int k = 0; k < 2; ++k)
+                CHECK(N[k] == Approx(double(near.energy.A[3 + k][0])).epsilon(3e-3).margin(1e-7));
+            CHECK(M ==
+                  Approx(1).epsilon(1e-2));  // a signed lobe held to 0 has more, by what dips below (docs/bcsdf.md)
+        }
+}
+
+TEST_CASE("a batch of exits is its exits one by one", "[bcsdf]") {
+    std::mt19937 random(12);
+    const auto tables = std::make_unique<UnfoldedTables>();
+    for (const FurPreset& preset : fur_presets) {
+        FurParameters<3> p = parameters_of<3>(preset);
+        p.sigma_ca[1] *= 2, p.sigma_ca[2] *= 0.1f;
+        FurFibre<3> fibres[2];
+        REQUIRE(prepare(p, default_view(), fibres[0]) == FurStatus::ok);
+        REQUIRE(prepare(p, default_view(), fibres[1]) == FurStatus::ok);
+        REQUIRE(unfold(fibres[1], *tables));
+        for (int i = 0; i < 40; ++i) {
+            NearField<3> near;
+            const Query at = random_query(random);
+            near_field(fibres[i % 2], at.theta_i, i == 39 ? 1.5f : at.h, near);  // 1.5: not valid
+            constexpr int count = 53;
+            float theta_r[count], phi[count];
+            for (int k = 0; k < count; ++k) {
+                const Query q = random_query(random);
+                theta_r[k] = k == 7 ? 1.6f : q.theta_r, phi[k] = k == 9 ? std::nanf("") : (k == 11 ? 1e5f : q.phi);
+            }
+            Colour<3> S[count + 1];
+            S[count].value[0] = 42;
+            eval(near, count, theta_r, phi, S);
+            CHECK(S[count].value[0] == 42);
+            for (int k = 0; k < count; ++k) {
+                const Colour<3> one = near.eval(theta_r[k], phi[k]);
+                // The same sums in another order, and 1 / cos^2 as a factor: some ten roundings of 6e-8.
+                for (int c = 0; c < 3; ++c)
+                    CHECK(double(S[k].value[c]) == Approx(double(one.value[c])).epsilon(2e-6).margin(1e-12));
+            }
+        }
+    }
+}
+
+TEST_CASE("tables that do not fit are refused and change nothing", "[bcsdf]") {
+    const auto tables = std::make_unique<UnfoldedTables>();
+    FurParameters<3> p = parameters_of<3>(*find_preset("bobcat"));
+    FurFibre<3> fibre;
+    p.eta = 1.1f;  // sqrt(sigma) over a range of 1.55
+    REQUIRE(prepare(p, default_view(), fibre) == FurStatus::ok);
+    const float before = near_lobes(fibre, 0.3f, -0.2f, 2.0f, 0.4f).N[3][0];
+    CHECK_FALSE(unfold(fibre, *tables));
+    CHECK(fibre.tables == nullptr);
+    CHECK(near_lobes(fibre, 0.3f, -0.2f, 2.0f, 0.4f).N[3][0] == before);
+    p.eta = 1.5f, p.kappa = 0;
+    REQUIRE(prepare(p, default_view(), fibre) == FurStatus::ok);
+    CHECK_FALSE(unfold(fibre, *tables));  // nothing to unfold
+}
+
+TEST_CASE("samplers draw from the same densities with unfolded tables", "[bcsdf]") {
+    const auto tables = std::make_unique<UnfoldedTables>();
+    FurFibre<3> slow;
+    REQUIRE(prepare(parameters_of<3>(*find_preset("bobcat")), default_view(), slow) == FurStatus::ok);
+    FurFibre<3> fast = slow;
+    REQUIRE(unfold(fast, *tables));
+    NearField<3> near[2];
+    FarField<3> far[2];
+    NearSampler<3> a[2];
+    FarSampler<3> b[2];
+    const FurFibre<3>* fibres[2] = {&slow, &fast};
+    for (int i = 0; i < 2; ++i) {
+        near_field(*fibres[i], 0.5f, 0.3f, near[i]), far_field(*fibres[i], 0.5f, OffsetRange{}, far[i]);
+        a[i].prepare(near[i]), b[i].prepare(far[i]);
+    }
+    std::mt19937 random(3);
+    std::uniform_real_distribution<float> u(0, 0.999f);
+    for (int i = 0; i < 200; ++i) {
+        const RandomNumbers numbers = {u(random), u(random), u(random), u(random), u(random)};
+        const auto s = a[0].sample(numbers), t = a[1].sample(numbers);
+        CHECK((s.phi == t.phi && s.theta_r == t.theta_r && s.pdf == t.pdf));
+        CHECK(double(s.weight[0]) == Approx(double(t.weight[0])).epsilon(2e-3));
+        CHECK(b[0].sample(numbers).pdf == b[1].sample(numbers).pdf);
+    }
+}

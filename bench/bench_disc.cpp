@@ -2,9 +2,9 @@
 // --tables). The true error is the relative L2 distance from the same solver on a grid far finer (--reference).
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -16,7 +16,8 @@ using namespace medulla;
 
 namespace {
 
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+/// Processor time: the machine's other work costs less of it than of the wall's.
+double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 double distance(const std::vector<double>& a, const std::vector<double>& b) {
     double error = 0, norm = 0;

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sim2d/analog.hpp"
@@ -68,25 +70,37 @@ inline sim2d::SlabOptions slab_options(double g, double scale, bool estimate) {
     return o;
 }
 
-/// One (sigma, g) at every `along`. The slab is solved at its own resolution, whatever the target.
-inline Slice solve_slice(bool disc, double sigma, double g, const std::vector<double>& along, double target,
-                         bool estimate) {
-    Slice out;
-    if (disc) {
-        sim2d::DiscOptions o;
-        o.target_error = target, o.estimate_error = estimate;
-        for (auto& p : sim2d::DiscSolver(g, o).solve(sigma, along, kBins)) out.push_back({std::move(p)});
-    } else {
-        sim2d::SlabOptions o;
-        o.estimate_error = estimate;
-        for (auto& p : sim2d::SlabSolver(g, o).solve(sigma, along, kBins / 2))
-            out.push_back({std::move(p.back), std::move(p.forward)});
+/// The deterministic solver of one g; threads may share it. The slab has a resolution of its own, whatever the target.
+class SliceSolver {
+  public:
+    SliceSolver(bool disc, double g, double target, bool estimate) {
+        if (disc) {
+            sim2d::DiscOptions o;
+            o.target_error = target, o.estimate_error = estimate;
+            disc_.emplace(g, o);
+        } else {
+            sim2d::SlabOptions o;
+            o.estimate_error = estimate;
+            slab_.emplace(g, o);
+        }
     }
-    return out;
-}
+    Slice solve(double sigma, const std::vector<double>& along) const {
+        Slice out;
+        if (disc_)
+            for (auto& p : disc_->solve(sigma, along, kBins)) out.push_back({std::move(p)});
+        else
+            for (auto& p : slab_->solve(sigma, along, kBins / 2))
+                out.push_back({std::move(p.back), std::move(p.forward)});
+        return out;
+    }
+
+  private:
+    std::optional<sim2d::DiscSolver> disc_;
+    std::optional<sim2d::SlabSolver> slab_;
+};
 
 inline Lobes solve_deterministic(const TableCell& c, const Resolution& r) {
-    if (c.disc) return lobes(solve_slice(true, c.sigma, c.g, {c.along}, r.disc_target, false)[0]);
+    if (c.disc) return lobes(SliceSolver(true, c.g, r.disc_target, false).solve(c.sigma, {c.along})[0]);
     const sim2d::SlabSolver solver(c.g, slab_options(c.g, r.slab_scale, false));
     const sim2d::SlabProfile p = solver.solve(c.sigma, {c.along}, kBins / 2)[0];
     return {p.back.lobe, p.forward.lobe};

@@ -10,6 +10,7 @@
 #include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -91,14 +92,21 @@ void solve_table(bool disc, double target, double reference, Errors& e) {
     const tables::Request axes = tables::default_request();
     const std::size_t slices = axes.sigma.size() * axes.g.size();
     const std::vector<double>& along = disc ? axes.h.values : axes.theta_i.values;
+    std::vector<std::optional<bench::SliceSolver>> ours_at(axes.g.size()), truth_at(axes.g.size());
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t i = 0; i < axes.g.size(); ++i) {
+        ours_at[i].emplace(disc, axes.g.values[i], target, true);
+        if (reference > 0) truth_at[i].emplace(disc, axes.g.values[i], reference, false);
+    }
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t s = 0; s < slices; ++s) {
         // The costly end first: great sigma.
         const std::size_t slice = slices - 1 - s;
-        const double sigma = axes.sigma.values[slice / axes.g.size()], g = axes.g.values[slice % axes.g.size()];
-        const bench::Slice ours = bench::solve_slice(disc, sigma, g, along, target, true);
+        const double sigma = axes.sigma.values[slice / axes.g.size()];
+        const std::size_t ig = slice % axes.g.size();
+        const bench::Slice ours = ours_at[ig]->solve(sigma, along);
         bench::Slice truth;
-        if (reference > 0) truth = bench::solve_slice(disc, sigma, g, along, reference, false);
+        if (reference > 0) truth = truth_at[ig]->solve(sigma, along);
 #pragma omp critical
         for (std::size_t i = 0; i < ours.size(); ++i)
             for (std::size_t k = 0; k < ours[i].size(); ++k) {
@@ -216,11 +224,12 @@ bool compare(json& out) {
         std::vector<std::vector<double>> p(3 * sides);
         std::vector<double> excess;  // (true error^2 less stated error^2) over the latter
         std::size_t skipped = 0;
-        for (std::size_t ig = 0; ig < axes.g.size(); ++ig)
+        for (std::size_t ig = 0; ig < axes.g.size(); ++ig) {
+            const bench::SliceSolver solver(disc, axes.g.values[ig], 1e-3, true);
             for (std::size_t is = 0; is < axes.sigma.size(); ++is) {
                 const TableCell c{disc, axes.sigma.values[is], axes.g.values[ig],
                                   along[(7 * is + 3 * ig) % along.size()]};
-                const bench::Profiles exact = bench::solve_slice(disc, c.sigma, c.g, {c.along}, 1e-3, true)[0];
+                const bench::Profiles exact = solver.solve(c.sigma, {c.along})[0];
                 std::vector<bench::Profiles> found;
                 for (std::uint64_t r = 0; r < kRepetitions; ++r)
                     found.push_back(bench::random_profiles(c, 256, r + 1, ig * axes.sigma.size() + is));
@@ -258,6 +267,7 @@ bool compare(json& out) {
                     }
                 }
             }
+        }
         double mean = 0, deviation = 0;
         for (const double x : excess) mean += x / double(excess.size());
         for (const double x : excess) deviation += (x - mean) * (x - mean);
@@ -299,10 +309,11 @@ bool compare(json& out) {
 
 int main(int argc, char** argv) {
     std::string json_file, svg_file;
-    bool tables = false, compared = false;
+    bool cells_too = true, tables = false, compared = false;
     double reference = 0;
     std::size_t cells = 32;
     CLI::App app("Run time against error of the solvers");
+    app.add_flag("!--no-cells", cells_too, "leave the twelve cells out");
     app.add_flag("--tables", tables, "time both default tables too");
     app.add_option("--reference", reference, "with --tables: target error of a finer grid to take true errors from");
     app.add_option("--cells", cells, "with --tables: cells per table that the random methods' time is estimated from");
@@ -314,6 +325,7 @@ int main(int argc, char** argv) {
     json out = {{"instruction_set", tracer_target()}};
     std::vector<bench::Panel> panels;
     for (const TableCell& c : kCells) {
+        if (!cells_too) break;
         panels.push_back(measure(c));
         out["cells"].push_back({{"cell", panels.back().title}, {"seconds_error", to_json(panels.back().points)}});
     }

@@ -100,20 +100,27 @@ void add_modes(const std::vector<Complex>& c, std::vector<double>& lobe) {
 
 /// Measured (docs/accuracy.md), for sigma <= 16 and |g| <= 0.95. Errors fall like the third power of all steps.
 /// Scattering makes the source under the rim behave like z log z over a depth z = rim^2 / 2; light that is scattered
-/// twice carries modes of g^(2 k).
+/// twice carries modes of g^(2 k). Narrow phase functions need modes, not circles: light that turns slowly changes
+/// slowly on the way inwards.
 DiscGridSize automatic(double sigma, double sigma_a, double g, const DiscOptions& options) {
     const double scale = portable::exp(portable::log(options.target_error / 1e-3) / 3),
                  depth = std::min(sigma + sigma_a, 40.0);
+    const double narrow = std::abs(g), turning = 1.35 - 2 * std::max(0.0, narrow - 0.65);
     DiscGridSize size;
-    size.circles = options.circles > 0 ? options.circles : static_cast<int>(std::ceil((8 + depth) / scale));
+    size.circles =
+        options.circles > 0
+            ? options.circles
+            : static_cast<int>(std::ceil((10 + 1.1 * turning * depth) * portable::exp(-0.8 * portable::log(scale))));
     size.gap = options.gap > 0 ? options.gap : std::min(0.3 * scale, 0.4);
-    size.rim = options.rim > 0 ? options.rim : 0.003 * scale * std::sqrt(16 / std::clamp(depth, 1.0, 16.0));
+    const double thin = 0.003 * std::sqrt(16 / std::clamp(depth, 1.0, 16.0)) / (1 + 5 * std::max(0.0, narrow - 0.85));
+    size.rim = options.rim > 0 ? options.rim : scale * thin;
     size.growth = 1 + scale * (0.17 + 0.13 * portable::exp(-depth / 4));
     const double visible = 0.6 * options.target_error / std::min(sigma, 1.0);
-    const double tail = g == 0 || visible >= 1 ? 0 : portable::log(visible) / (2 * portable::log(std::abs(g)));
+    const double tail = g == 0 || visible >= 1 ? 0 : portable::log(visible) / (2 * portable::log(narrow));
     // Near the tangent the lobe has a kink at phi = 0, softened by g only: algebraic in the modes.
-    const double kink =
-        (19 + 5 * std::min(std::sqrt(depth), 8.0)) * (1 + std::max(0.0, 3 * std::abs(g) - 1.5)) / std::max(scale, 0.5);
+    const double root = std::min(std::sqrt(depth), 8.0);
+    const double sharp = 3 * std::max(0.0, narrow - 0.5) + 12 * std::max(0.0, narrow - 0.9);
+    const double kink = (19 + 5 * root + (31 + 2 * root) * sharp) / std::max(scale, 0.5);
     const double modes = std::min(std::max(kink, tail), 200.0);
     size.modes = options.modes > 0 ? options.modes : static_cast<int>(modes / 8) * 8 + 6;
     return size;
@@ -123,8 +130,8 @@ const double coarsening = 1.4;
 
 DiscGridSize coarser(const DiscGridSize& size) {
     const auto rounded = [](double x, int least) { return std::max(least, static_cast<int>(x)); };
-    return {rounded(size.circles / coarsening, 4), rounded(size.modes * 0.75, 8), std::min(size.gap * coarsening, 0.5),
-            size.rim * coarsening, 1 + (size.growth - 1) * coarsening};
+    return {rounded(size.circles / coarsening + 0.5, 4), rounded(size.modes * 0.75, 8),
+            std::min(size.gap * coarsening, 0.5), size.rim * coarsening, 1 + (size.growth - 1) * coarsening};
 }
 
 /// Third order: a coarse grid misses coarsening^3 times what the fine one does. Error of the fine grid over the
@@ -211,6 +218,8 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
             }
             profile.standard_error = share * std::sqrt(error / square) + (sigma > 0 ? fine.residual : 0);
         }
+        // Truncated modes ring. The truth is not negative, so its nearest lobe that is not either is nearer to it.
+        for (double& x : profile.lobe) x = std::max(x, 0.0);
         const double sum = integral(profile.lobe);
         for (double& x : profile.lobe) x /= sum;
         profiles.push_back(std::move(profile));

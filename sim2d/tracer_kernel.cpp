@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "sim2d/random.hpp"
@@ -48,6 +49,12 @@ void directions(const TracerCell& cell, std::size_t step, std::size_t count, std
 
 /// Scattering orders fit 24 bits; the lattice's shifts take a block that no order reaches in practice.
 constexpr std::uint32_t kShiftBlock = 0xFFFFFFu;
+
+/// Compiled, and possible on this processor; asked once, since choosing one hides the others.
+const std::vector<std::int64_t>& targets() {
+    static const std::vector<std::int64_t> all = hwy::SupportedAndGeneratedTargets();
+    return all;
+}
 
 }  // namespace
 
@@ -154,6 +161,21 @@ std::vector<std::array<std::uint32_t, 4>> tracer_words(const TracerCell& cell, s
 }
 
 const char* tracer_target() { return HWY_DYNAMIC_DISPATCH(Target)(); }
+
+std::vector<std::string> tracer_targets() {
+    std::vector<std::string> names;
+    for (const std::int64_t target : targets()) names.push_back(hwy::TargetName(target));
+    return names;
+}
+
+void set_tracer_target(const std::string& name) {
+    std::int64_t chosen = 0;  // Highway's word for "as the processor has it"
+    for (const std::int64_t target : targets())
+        if (hwy::TargetName(target) == name) chosen = target;
+    if (chosen == 0 && !name.empty()) throw std::invalid_argument("instruction set: not one of this processor's");
+    hwy::SetSupportedTargetsForTest(chosen);
+    hwy::GetChosenTarget().DeInit();  // chosen anew at the next call
+}
 
 }  // namespace medulla::sim2d
 #endif

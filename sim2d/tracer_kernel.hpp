@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace medulla::sim2d {
@@ -77,7 +78,12 @@ struct TracerCounter {
 TracerCounter tracer_counter(const TracerCell& cell, std::uint32_t order, std::uint32_t randomisation,
                              std::uint32_t walk) noexcept;
 
-/// Instruction set that the kernel runs on here.
+/// Instruction set that the kernel runs on, and all that it could run on here, the best first.
 const char* tracer_target();
+std::vector<std::string> tracer_targets();
+
+/// From now on the kernel runs on that one of tracer_targets(), "" for the best. For tests and benchmarks: not while
+/// another thread traces.
+void set_tracer_target(const std::string& name);
 
 }  // namespace medulla::sim2d

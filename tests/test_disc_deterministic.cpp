@@ -331,36 +331,28 @@ TEST_CASE("disc, deterministic: limits of absorption", "[disc]") {
     }
 }
 
-TEST_CASE("disc, deterministic: stress", "[disc]") {
-    const std::vector<double> h = {0, 0.5, 1 - 1e-7, 1, -1, -1 + 1e-12};
-    DiscOptions coarse;
-    coarse.target_error = 1e-2;
-    for (const double g : {-0.99, -0.5, 0.0, 1e-300, 0.95, 0.999})
+TEST_CASE("disc, deterministic: stress", "[disc][stress]") {
+    const std::vector<double> h = {0, 5e-324, 0.5, 1 - 1e-7, 1, -1, -1 + 1e-12};
+    for (const double g : {-0.99, -0.5, 0.0, 5e-324, 1e-300, 0.95, 0.999})
         for (const double sigma : {0.0, 5e-324, 1e-300, 1e-8, 1.0, 100.0, 1000.0}) {
-            if (sigma >= 100 && g != 0 && g != 0.999) continue;  // seconds each
-            if (sigma == 1000 && g != 0) continue;
+            DiscOptions coarse;
+            coarse.target_error = sigma < 100 ? 1e-2 : 1e-1;
             const std::vector<Profile> profiles = DiscSolver(g, coarse).solve(sigma, h, 72);
             for (std::size_t i = 0; i < h.size(); ++i) {
                 CAPTURE(g, sigma, h[i]);
                 const Profile& p = profiles[i];
                 const double half = std::sqrt((1 - h[i]) * (1 + h[i]));
-                CHECK(p.energy == Approx(-std::expm1(-2 * sigma * half)).epsilon(1e-12));
-                double sum = 0, least = 0, most = 0;
-                bool finite = std::isfinite(p.mean_length) && std::isfinite(p.standard_error);
-                for (const double x : p.lobe) {
-                    finite = finite && std::isfinite(x);
-                    sum += x * 2 * pi / 72, least = std::min(least, x), most = std::max(most, x);
-                }
-                CHECK(finite);
-                CHECK(sum == Approx(1).epsilon(1e-9));
-                // Truncated modes ring: a lobe may dip below 0 by what its error estimate allows. From sigma = 100 on
-                // the grids are beyond what they are made for, and their difference says so.
-                if (p.standard_error > 0.5) {
-                    CHECK(sigma >= 100);
-                } else {
-                    CHECK(least >= -(p.standard_error + 1e-2) * most);
-                }
+                CHECK(p.energy == Approx(-std::expm1(-2 * sigma * half)).epsilon(1e-12).margin(0));
+                double sum = 0;
+                bool density = true;
+                for (const double x : p.lobe) density = density && std::isfinite(x) && x >= 0, sum += x * 2 * pi / 72;
+                CHECK(density);
+                CHECK(sum == Approx(1).epsilon(1e-12));
+                CHECK((std::isfinite(p.mean_length) && std::isfinite(p.standard_error) && p.standard_error >= 0));
+                // Within what the grids are made for, the estimate says so; from sigma = 100 on it may say anything.
+                if (sigma <= 1) CHECK(p.standard_error < 5e-2);
             }
+            CHECK(profiles[0].lobe == profiles[1].lobe);  // a denormal offset is none
         }
 }
 

@@ -1,7 +1,11 @@
 // The fast tracer against its analog twin, the deterministic solvers and closed forms (docs/physics.md, 2 to 4).
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <numeric>
+#include <set>
+#include <string>
 #include <thread>
 
 #include "sim2d/analog.hpp"
@@ -265,7 +269,7 @@ TEST_CASE("The tracer holds at the ends of every range", "[tracer][stress]") {
     TracerOptions o = options(1);  // one path: sixteen, one per randomisation
     for (const double sigma : {0.0, 5e-324, 1e-300, 1e-38, 1e-8, 1.0, 1e3})
         for (const double g : {-0.99, 0.0, 0.999}) {
-            for (const double h : {0.0, 1.0, 1 - 1e-7, -1.0}) {
+            for (const double h : {0.0, 5e-324, 1.0, 1 - 1e-7, -1.0}) {
                 ++o.cell;
                 INFO("sigma " << sigma << " g " << g << " h " << h);
                 const auto t = trace_expected_disc(sigma, g, h, 24, o);
@@ -274,7 +278,7 @@ TEST_CASE("The tracer holds at the ends of every range", "[tracer][stress]") {
                 CHECK(t.profile.energy == disc_energy(sigma, h));
                 CHECK((std::isfinite(t.profile.mean_length) && t.profile.mean_length >= 0));
             }
-            for (const double theta : {0.0, 89.99 * pi / 180, pi / 2, -pi / 2}) {
+            for (const double theta : {0.0, 5e-324, 89.99 * pi / 180, pi / 2, -pi / 2}) {
                 ++o.cell;
                 INFO("sigma " << sigma << " g " << g << " theta " << theta);
                 const auto t = trace_expected_slab(sigma, g, theta, 12, o);
@@ -374,6 +378,61 @@ TEST_CASE("Walks without absorption in the list are those of the plain tracer, b
     }
     CHECK_THROWS_AS(trace_expected_disc(1, 0, 0, {-1.0}, 8, {}), std::invalid_argument);
     CHECK_THROWS_AS(trace_disc(1, 0, 0, {std::nan("")}, 8, {}), std::invalid_argument);
+}
+
+TEST_CASE("Every instruction set follows the same walks", "[tracer]") {
+    struct Restore {
+        ~Restore() { set_tracer_target(""); }
+    } restore;
+    REQUIRE(!tracer_targets().empty());
+    CHECK_THROWS_AS(set_tracer_target("no such"), std::invalid_argument);
+    CHECK(tracer_targets().front() == tracer_target());
+    std::vector<Profile> discs, backs;
+    for (const std::string& target : tracer_targets()) {
+        set_tracer_target(target);
+        CHECK(target == tracer_target());
+        discs.push_back(trace_expected_disc(3, 0.8, 0.3, 120, options(4096)).profile);
+        backs.push_back(trace_expected_slab(3, 0.8, 0.3, 60, options(4096)).profile.back);
+    }
+    // The same random numbers, other roundings: walks part where a float's 1e-7 decides, which is one in 10^4 of some
+    // ten decisions each; so their difference is 1e-2 of two independent runs', a tenth is far out.
+    for (std::size_t t = 1; t < discs.size(); ++t) {
+        INFO(tracer_targets()[t] << ", difference over standard error "
+                                 << std::sqrt(distance2(discs[t].lobe, discs[0].lobe)) / discs[0].standard_error);
+        CHECK(std::sqrt(distance2(discs[t].lobe, discs[0].lobe)) < 0.1 * discs[0].standard_error);
+        CHECK(std::sqrt(distance2(backs[t].lobe, backs[0].lobe)) < 0.1 * backs[0].standard_error);
+    }
+}
+
+TEST_CASE("The last walks of seed space are as good as the first, and others", "[tracer][stress]") {
+    // 2^8 randomisations of 2^32 walks: the 2^40 paths of a cell.
+    TracerCell cell;
+    cell.sigma = 3, cell.g = 0.5, cell.h = 0.3, cell.bins = 24;
+    cell.plan = plan_of(cell);
+    const std::uint64_t walks = 2048, last = (std::uint64_t{1} << 32) - walks;
+    WalkTracer tracer(cell);
+    std::vector<double> total[2];
+    std::vector<std::vector<double>> bins[2];
+    for (std::uint32_t r = 0; r < 24; ++r)
+        for (const int end : {0, 1}) {
+            TracerSums sums;
+            tracer.trace(end ? 255 - r : r, end ? last : 0, walks, sums);
+            REQUIRE(sums.walks == walks);
+            for (const double x : sums.bins) REQUIRE((std::isfinite(x) && x >= 0));
+            total[end].push_back(sum(sums.bins)), bins[end].push_back(sums.bins);
+        }
+    for (std::size_t r = 0; r < 24; ++r)
+        for (std::size_t q = 0; q < 24; ++q) CHECK(bins[0][r] != bins[1][q]);
+    // t of 23 degrees: 6 is once in 10^5.
+    const Moments a = moments(total[0]), b = moments(total[1]);
+    CHECK(std::abs(a.mean - b.mean) < 6 * std::hypot(a.error, b.error));
+    // Consecutive blocks and the two ends: no word of a walk's first scatterings comes twice.
+    std::set<std::array<std::uint32_t, 4>> seen;
+    for (const std::uint32_t randomisation : {0u, 1u, 254u, 255u})
+        for (const std::uint32_t order : {1u, 2u, 0xFFFFFEu})
+            for (const std::uint32_t first : {0u, 0x7FFFFF00u, 0xFFFFFE00u})
+                for (const auto& words : tracer_words(cell, order, randomisation, first, 512)) seen.insert(words);
+    CHECK(seen.size() == 4 * 3 * 3 * 512);
 }
 
 }  // namespace

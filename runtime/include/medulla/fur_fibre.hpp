@@ -152,7 +152,8 @@ inline constexpr float widest_root_range = 1.4f;
 
 /// Multiplies the material's tables out into `tables`, which `fibre` then reads instead of the factors; takes about
 /// 1 ms with the default pack. false, and nothing is changed for the fibre, where they do not fit: longer or fewer than
-/// 3 spans of an axis, longitudinal tables on different axes, an axis of absorption, eta so near 1 that sigma's range is wide.
+/// 3 spans of an axis, longitudinal tables on different axes, an axis of absorption, eta so near 1 that sigma's range
+/// is wide.
 template <int Channels>
 MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexcept {
     fibre.tables = nullptr;

@@ -136,10 +136,10 @@ class PackSource : public Source {
             if (table) check_nodes(table, path);
         const auto text = nlohmann::json::parse(pack_.text, pack_.text + pack_.text_bytes, nullptr, false);
         for (const TableKind kind : lobe_kinds) {
-            const auto path =
+            const auto noise =
                 nlohmann::json::json_pointer(fmt::format("/fit/{}/input_noise", medulla::tables::name_of(kind)));
-            const bool known = text.is_object() && text.contains(path) && text[path].is_number();
-            noise_[static_cast<std::size_t>(kind)] = known ? text[path].get<double>() : 0.0;
+            const bool known = text.is_object() && text.contains(noise) && text[noise].is_number();
+            noise_[static_cast<std::size_t>(kind)] = known ? text[noise].get<double>() : 0.0;
         }
     }
 

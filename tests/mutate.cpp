@@ -279,8 +279,8 @@ bool ask(const PackView& pack, Random& random) {
         if (!table || !table.has_exit()) continue;
         const auto kind = static_cast<TableKind>(table.layout.kind);
         if (kind == TableKind::azimuthal)
-            for (const float absorption : {0.0f, 0.7f, 30.0f, -1.0f})
-                sum += azimuthal(pack, sigma, g, h, 1.0f, absorption);
+            for (const float absorption : {0.0f, 0.7f, 30.0f})
+                if (absorption == 0 || absorbs(pack)) sum += azimuthal(pack, sigma, g, h, 1.0f, absorption);
         if (kind == TableKind::longitudinal_back) sum += longitudinal(pack, Side::back, sigma, g, h, 0.3f);
         if (kind == TableKind::longitudinal_forward) sum += longitudinal(pack, Side::forward, sigma, g, h, 0.3f);
         LobeQuery query = {};

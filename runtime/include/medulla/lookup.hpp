@@ -323,7 +323,7 @@ MEDULLA_FN T survival_of(T absorption, T length) noexcept {
 /// pack does not know.
 MEDULLA_FN float survival(const PackView& pack, float sigma, float g, float h, float absorption) noexcept {
     if (absorption == 0) return 1;
-    if (!absorbs(pack)) return std::numeric_limits<float>::quiet_NaN();
+    if (!absorbs(pack)) return detail::not_a_number();
     LobeQuery query;
     query.sigma = sigma, query.g = g, query.h = h < 0 ? -h : h, query.absorption = absorption;
     const TableView& table = pack[TableKind::survival];

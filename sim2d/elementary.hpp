@@ -98,7 +98,8 @@ inline double log(double x) noexcept {
 inline double exp(double x) noexcept {
     if (!(x <= 709.782712893383973096)) return x > 0 ? std::numeric_limits<double>::infinity() : x;
     if (x < -745.133219101941108420) return 0;
-    const double k = std::floor(x * 1.44269504088896338700 + 0.5);
+    // The nearest whole number, without floor, which is a call where SSE2 is all there is.
+    const double k = (x * 1.44269504088896338700 + 0x1.8p52) - 0x1.8p52;
     const double high = x - k * detail::ln2_high, low = k * detail::ln2_low, r = high - low, z = r * r;
     const double c = r - z * (1.66666666666666019037e-01 +
                               z * (-2.77777777770155933842e-03 +

@@ -19,21 +19,34 @@ std::atomic<bool> stop{false};
 std::atomic<int> caught{0};
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
 
-/// Catches SIGINT and SIGTERM while it lives: the first asks to stop, the second ends the process at once.
+constexpr unsigned seconds_of_grace = 5;
+
+/// What a signal handler may do: say it and end. Slices are on disk or not, so nothing is left half done.
+[[noreturn]] void give_up() {
+    constexpr char text[] = "medulla-precompute: interrupted: slices in work given up; go on with --resume\n";
+    if (::write(STDERR_FILENO, text, sizeof text - 1) < 0) ::_exit(1);
+    ::_exit(128 + caught);
+}
+
+/// Catches SIGINT and SIGTERM while it lives: the first gives the slices in work a few seconds to end, the second none.
 class Interrupts {
   public:
     Interrupts() {
         stop = false, caught = 0;
         struct sigaction action = {};
         action.sa_handler = [](int number) {
-            if (caught.exchange(number) != 0) ::_exit(128 + number);
+            if (number == SIGALRM || caught.exchange(number) != 0) give_up();
             stop = true;
+            ::alarm(seconds_of_grace);
         };
         action.sa_flags = SA_RESTART;
         ::sigaction(SIGINT, &action, &old_[0]);
         ::sigaction(SIGTERM, &action, &old_[1]);
+        ::sigaction(SIGALRM, &action, &old_[2]);
     }
     ~Interrupts() {
+        ::alarm(0);
+        ::sigaction(SIGALRM, &old_[2], nullptr);
         ::sigaction(SIGINT, &old_[0], nullptr);
         ::sigaction(SIGTERM, &old_[1], nullptr);
     }
@@ -41,7 +54,7 @@ class Interrupts {
     Interrupts& operator=(const Interrupts&) = delete;
 
   private:
-    struct sigaction old_[2];
+    struct sigaction old_[3];
 };
 
 /// Whether the output holds this job already. Throws Error where it is of another one.

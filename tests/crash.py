@@ -218,6 +218,16 @@ class Nothing(unittest.TestCase):
         status, out, err = run("furtable", "info", self.path("plain.h5"))
         self.assertIn(digest.hexdigest(), out)
 
+    def test_interrupt_within_one_long_slice(self):
+        """No slice ends for hours: the process still does."""
+        process = start("medulla-precompute", "-o", self.path("t.h5"), "--sigma-range", "900:900", "--g-range", "0.9:0.9",
+                        "--table", "azimuthal", "--method", "analog", "--paths", 10**9, "--progress", "none")
+        time.sleep(0.5)
+        process.send_signal(signal.SIGTERM)
+        out, err = process.communicate(timeout=60)
+        self.assertEqual((process.returncode, out), (143, ""), err)
+        self.one_line(err, "interrupted", "--resume")
+
     def test_output_that_is_a_folder(self):
         os.mkdir(self.path("t.h5"))
         self.one_line(self.solve("t.h5", *SMALL, status=1), "t.h5", "folder")

@@ -91,7 +91,13 @@ TEST_CASE("intervals and the far field are the mean of the near field, lobe by l
         // Midpoints per deviation of the narrowest lobe over the slope of 2: at least 6, so they are exact to float.
         const int directions = 24, n = int(std::max(120.0, 20 / double(p.beta_n)));
         for (int d = 0; d < directions; ++d) {
-            const double phi = 2 * pi * (d + double(u(random))) / directions - pi;
+            double phi = 2 * pi * (d + double(u(random))) / directions - pi;
+            if (d %
+                2) {  // where a lobe of some offset leaves: a narrow range's beam would pass between even directions
+                NearField<3> near;
+                near_field(fibre, theta_i, h1 + (h2 - h1) * u(random), near);
+                phi = double(near.centre[d / 2 % lobe_count] + 2 * p.beta_n * (u(random) - 0.5f));
+            }
             const auto l = far.lobes(0.0f, float(phi));
             const auto r = mean_of_near(p, double(theta_i), double(float(phi)), double(h1), double(h2), n);
             for (int k = 0; k < lobe_count; ++k)
@@ -101,11 +107,7 @@ TEST_CASE("intervals and the far field are the mean of the near field, lobe by l
                 }
         }
         for (int k = 0; k < lobe_count; ++k) {
-            // A lobe that is at none of the directions (a narrow range's beam between them) has but its far tail there.
-            NearField<3> middle;
-            near_field(fibre, theta_i, 0.5f * (h1 + h2), middle);
-            const double there = 1e-3 * double(middle.energy.A[k][0]) / (2 * pi);
-            if (!(norm[k] > std::max(1e-16, 3 * directions * there * there))) continue;
+            if (!(norm[k] > 1e-16)) continue;
             const double relative = std::sqrt(error[k] / norm[k]);
             if (wanted && relative > 1e-3)
                 std::printf("case %d lobe %s: %.2e  eta %g kappa %g beta_n %g theta_i %g h %g..%g layers %g ms %g\n", i,

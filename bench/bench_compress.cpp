@@ -182,7 +182,7 @@ void write_svg(const std::string& file, const Bench& bench) {
             }
             if (!panel.curves.empty()) panels.push_back(panel);
         }
-    std::ofstream(file) << svg("Compression of the default pack's tables", panels, 3);
+    std::ofstream(file) << svg("Ways to compress the same table", panels, 3);
 }
 
 }  // namespace

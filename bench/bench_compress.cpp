@@ -1,7 +1,7 @@
 // Ways to compress the same table, in one process and one thread: processor seconds, bytes, error and nanoseconds of
 // packs at ranks 4 to 96 and of the packs that bytes choose, of non-negative ones, of Tucker and of a truncated SVD in
 // the same number of bytes, and of full-tensor CP-ALS. Usage: bench_compress TABLES.h5... [--full] [--json FILE]
-// [--svg FILE]; --full adds full-tensor ALS of the disc's table, minutes.
+// [--svg FILE]; --full adds what takes minutes: packs that bytes choose, and full-tensor ALS of the disc's table.
 #include <fmt/core.h>
 #include <omp.h>
 
@@ -182,7 +182,7 @@ void write_svg(const std::string& file, const Bench& bench) {
             }
             if (!panel.curves.empty()) panels.push_back(panel);
         }
-    std::ofstream(file) << svg("Compression of the default pack's tables", panels, 3);
+    std::ofstream(file) << svg("Ways to compress the same table", panels, 3);
 }
 
 }  // namespace
@@ -223,6 +223,7 @@ int main(int argc, char** argv) {
     }
     options = {};
     for (const std::size_t bytes : {32768, 49152, 65536, 102400, 153600, 204800}) {
+        if (!full) break;
         options.max_bytes = bytes;
         add_pack(bench, tables, fmt::format("CP, within {}", bytes), options);
     }

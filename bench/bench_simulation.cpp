@@ -1,234 +1,337 @@
-// Run time against error of the three solvers, analog, random and deterministic, on twelve cells of both tables.
-// Truth is a deterministic solution on a finer grid. One thread, in turn in one process.
-// Usage: bench_simulation [--json FILE] [--svg FILE]
+// Run time against error of the three solvers, analog, random and deterministic: cell by cell, for the default tables
+// (--tables), and the random solver against the deterministic one over every (sigma, g) of both tables (--compare).
+#include <omp.h>
+
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <ctime>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "sim2d/analog.hpp"
-#include "sim2d/disc_deterministic.hpp"
-#include "sim2d/slab_deterministic.hpp"
-#include "sim2d/tracer.hpp"
+#include "bench_lobes.hpp"
+#include "plot_log.hpp"
+#include "sim2d/random.hpp"
+#include "sim2d/tracer_kernel.hpp"
+#include "statistics.hpp"
+#include "tables/request.hpp"
 
 using namespace medulla;
 using namespace medulla::sim2d;
+using bench::Lobes;
+using bench::TableCell;
+using nlohmann::json;
 
 namespace {
 
-constexpr std::size_t kBins = 720;
+enum Method { kAnalog, kRandom, kDeterministic, kMethods };
+const std::vector<bench::Series> kSeries = {{"analog", "#888888"}, {"random", "#1f77b4"}, {"deterministic", "#d62728"}};
 
-/// Processor time: the machine's other work costs less of it than of the wall's.
+/// Processor time of all threads: the machine's other work costs less of it than of the wall's.
 double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+double wall() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-struct Cell {
-    bool disc;
-    double sigma, g, along;  ///< h or theta_i
-};
-
-const Cell kCells[] = {{true, 0.3, 0.0, 0.3}, {true, 0.3, 0.8, 0.3}, {true, 2, 0.0, 0.6},    {true, 2, 0.8, 0.6},
-                       {true, 12, 0.0, 0.3},  {true, 12, 0.9, 0.3},  {false, 0.3, 0.0, 0.5}, {false, 0.3, 0.8, 0.5},
-                       {false, 2, 0.0, 1.2},  {false, 2, 0.8, 1.2},  {false, 12, 0.0, 0.5},  {false, 12, 0.9, 0.5}};
-
-using Lobes = std::vector<std::vector<double>>;
-
-Lobes lobes(const Profile& p) { return {p.lobe}; }
-Lobes lobes(const SlabProfile& p) { return {p.back.lobe, p.forward.lobe}; }
-
-/// Relative L2 distance, of the worse lobe.
-double distance(const Lobes& a, const Lobes& b) {
-    double worst = 0;
-    for (std::size_t k = 0; k < a.size(); ++k) {
-        double d = 0, n = 0;
-        for (std::size_t i = 0; i < a[k].size(); ++i)
-            d += (a[k][i] - b[k][i]) * (a[k][i] - b[k][i]), n += b[k][i] * b[k][i];
-        worst = std::max(worst, std::sqrt(d / n));
-    }
-    return worst;
+double median(std::vector<double> v) {
+    std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
+    return v[v.size() / 2];
 }
 
-struct Point {
-    double seconds, error;
-};
-enum Method { kAnalog, kRandom, kDeterministic, kMethods };
-const char* const kNames[] = {"analog", "random", "deterministic"};
-const char* const kColours[] = {"#888888", "#1f77b4", "#d62728"};
-
-/// A deterministic solution on `scale` times the grid that it would choose, without a second grid.
-Lobes solve(const Cell& c, double scale, double& seconds) {
-    const double start = now();
-    Lobes out;
-    if (c.disc) {
-        DiscOptions o;
-        const double root = std::min(std::sqrt(c.sigma), 8.0), width = std::max(-std::log(std::max(c.g, 1e-9)), 0.02);
-        o.circles = std::max(6, static_cast<int>(scale * (18 + 8 * root)));
-        o.modes = std::max(15, static_cast<int>(scale * (23 + 5 * root + 2.3 * std::min(1 / width, 40.0))));
-        o.gap = std::clamp(0.7 * width * (1 + c.sigma / 8), 0.03, 0.25) / scale;
-        o.estimate_error = false;
-        out = lobes(DiscSolver(c.g, o).solve(c.sigma, {c.along}, kBins)[0]);
-    } else {
-        SlabOptions o;
-        const double wanted = c.g == 0 ? 64 : std::max(64.0, std::ceil(-9.5 / std::log(c.g)));
-        o.directions = static_cast<std::size_t>(std::max(8.0, scale * wanted));
-        o.estimate_error = false;
-        out = lobes(SlabSolver(c.g, o).solve(c.sigma, {c.along}, kBins / 2)[0]);
-    }
-    seconds = now() - start;
+json to_json(const std::vector<std::vector<bench::Point>>& points) {
+    json out;
+    for (std::size_t m = 0; m < points.size(); ++m)
+        for (const bench::Point& p : points[m]) out[kSeries[m].name].push_back({p.seconds, p.error});
     return out;
 }
 
-std::vector<Point> measure(const Cell& c, Method method, const Lobes& truth) {
-    std::vector<Point> points;
-    if (method == kDeterministic) {
-        for (const double scale : {0.4, 0.6, 0.8, 1.0}) {
-            double seconds = 0;
-            const Lobes found = solve(c, scale, seconds);
-            points.push_back({seconds, distance(found, truth)});
-        }
-        return points;
-    }
-    for (const std::uint64_t paths : {512, 4096, 32768, 262144}) {
+// Cells ---------------------------------------------------------------------------------------------------------------
+
+const TableCell kCells[] = {{true, 0.3, 0.0, 0.3},  {true, 0.3, 0.8, 0.3},  {true, 2, 0.0, 0.6},
+                            {true, 2, 0.8, 0.6},    {true, 12, 0.0, 0.3},   {true, 12, 0.9, 0.3},
+                            {false, 0.3, 0.0, 0.5}, {false, 0.3, 0.8, 0.5}, {false, 2, 0.0, 1.2},
+                            {false, 2, 0.8, 1.2},   {false, 12, 0.0, 0.5},  {false, 12, 0.9, 0.5}};
+
+/// One thread, in turn in one process; truth is a deterministic solution on a finer grid.
+bench::Panel measure(const TableCell& c) {
+    bench::Panel panel{title(c), {-4, 2}, std::vector<std::vector<bench::Point>>(kMethods)};
+    const Lobes truth = solve_deterministic(c, bench::kFinest);
+    const auto add = [&](Method method, auto&& run) {
         const double start = now();
-        Lobes found;
-        if (method == kAnalog) {
-            TraceOptions o;
-            o.paths = 4 * paths;
-            found = c.disc ? lobes(trace_disc(c.sigma, c.g, c.along, kBins, o))
-                           : lobes(trace_slab(c.sigma, c.g, c.along, kBins / 2, o));
-        } else {
-            TracerOptions o;
-            o.paths = paths;
-            found = c.disc ? lobes(trace_expected_disc(c.sigma, c.g, c.along, kBins, o).profile)
-                           : lobes(trace_expected_slab(c.sigma, c.g, c.along, kBins / 2, o).profile);
-        }
-        points.push_back({now() - start, distance(found, truth)});
+        const Lobes found = run();
+        const double seconds = now() - start;
+        panel.points[method].push_back({seconds, bench::distance(found, truth)});
+    };
+    for (const std::uint64_t paths : {512, 4096, 32768, 262144}) {
+        add(kAnalog, [&] { return trace_analog(c, 4 * paths).lobes; });
+        add(kRandom, [&] { return trace_random(c, paths, 0).lobes; });
     }
-    return points;
+    for (const bench::Resolution& r : bench::kResolutions)
+        add(kDeterministic, [&] { return solve_deterministic(c, r); });
+    std::printf("%s\n", panel.title.c_str());
+    for (std::size_t m = 0; m < kMethods; ++m) {
+        std::printf("  %-14s", kSeries[m].name);
+        for (const bench::Point& p : panel.points[m]) std::printf("  %9.5f s %.2e", p.seconds, p.error);
+        std::printf("\n");
+    }
+    std::fflush(stdout);
+    return panel;
 }
 
-struct Result {
-    Cell cell;
-    std::vector<Point> points[kMethods];
+// Tables --------------------------------------------------------------------------------------------------------------
+
+struct Errors {
+    std::vector<double> estimated, actual, energy;
 };
 
-std::string title(const Cell& c) {
-    char text[96];
-    std::snprintf(text, sizeof text, "%s, sigma %g, g %g, %s %g", c.disc ? "disc" : "slab", c.sigma, c.g,
-                  c.disc ? "h" : "theta_i", c.along);
-    return text;
-}
-
-std::string to_json(const std::vector<Result>& results) {
-    std::string out = "[";
-    char text[160];
-    for (const Result& r : results) {
-        out += (out.size() > 1 ? ",\n" : "\n") + std::string("{\"cell\":\"") + title(r.cell) + "\"";
-        for (int m = 0; m < kMethods; ++m) {
-            out += std::string(",\"") + kNames[m] + "\":[";
-            for (std::size_t i = 0; i < r.points[m].size(); ++i) {
-                std::snprintf(text, sizeof text, "%s{\"s\":%.4g,\"error\":%.4g}", i ? "," : "", r.points[m][i].seconds,
-                              r.points[m][i].error);
-                out += text;
+/// One table by the deterministic solver on all threads, against a finer grid where there is one.
+void solve_table(bool disc, double target, double reference, Errors& e) {
+    const tables::Request axes = tables::default_request();
+    const std::size_t slices = axes.sigma.size() * axes.g.size();
+    const std::vector<double>& along = disc ? axes.h.values : axes.theta_i.values;
+    std::vector<std::optional<bench::SliceSolver>> ours_at(axes.g.size()), truth_at(axes.g.size());
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t i = 0; i < axes.g.size(); ++i) {
+        ours_at[i].emplace(disc, axes.g.values[i], target, true);
+        if (reference > 0) truth_at[i].emplace(disc, axes.g.values[i], reference, false);
+    }
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t s = 0; s < slices; ++s) {
+        // The costly end first: great sigma.
+        const std::size_t slice = slices - 1 - s;
+        const double sigma = axes.sigma.values[slice / axes.g.size()];
+        const std::size_t ig = slice % axes.g.size();
+        const bench::Slice ours = ours_at[ig]->solve(sigma, along);
+        bench::Slice truth;
+        if (reference > 0) truth = truth_at[ig]->solve(sigma, along);
+#pragma omp critical
+        for (std::size_t i = 0; i < ours.size(); ++i)
+            for (std::size_t k = 0; k < ours[i].size(); ++k) {
+                e.estimated.push_back(ours[i][k].standard_error), e.energy.push_back(ours[i][k].energy_error);
+                if (reference > 0) e.actual.push_back(bench::relative_l2(ours[i][k].lobe, truth[i][k].lobe));
             }
-            out += "]";
-        }
-        out += "}";
     }
-    return out + "\n]\n";
 }
 
-/// One small log-log panel per cell: seconds 10^-4 to 10^2 across, error 10^-6 to 10 upwards.
-std::string to_svg(const std::vector<Result>& results) {
-    const double w = 250, h = 190, left = 46, bottom = 34, top = 20, right = 8;
-    const std::size_t columns = 4, rows = (results.size() + columns - 1) / columns;
-    char text[400];
-    std::snprintf(text, sizeof text,
-                  "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%g\" height=\"%g\" font-family=\"sans-serif\" "
-                  "font-size=\"10\">\n<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n",
-                  w * double(columns), h * double(rows) + 24);
-    std::string out = text;
-    for (std::size_t i = 0; i < results.size(); ++i) {
-        const double x0 = w * double(i % columns) + left, y0 = h * double(i / columns) + top;
-        const double width = w - left - right, height = h - top - bottom;
-        const auto x = [&](double s) { return x0 + width * (std::log10(s) + 4) / 6; };
-        const auto y = [&](double e) { return y0 + height * (1 - std::log10(std::max(e, 1e-6))) / 7; };
-        std::snprintf(text, sizeof text,
-                      "<text x=\"%.1f\" y=\"%.1f\">%s</text><rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" "
-                      "height=\"%.1f\" fill=\"none\" stroke=\"#aaa\"/>\n",
-                      x0, y0 - 5, title(results[i].cell).c_str(), x0, y0, width, height);
-        out += text;
-        for (int d = -4; d <= 2; d += 2) {
-            std::snprintf(
-                text, sizeof text,
-                "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"middle\">1e%d%s</text><line x1=\"%.1f\" y1=\"%.1f\" "
-                "x2=\"%.1f\" y2=\"%.1f\" stroke=\"#ddd\"/>\n",
-                x(std::pow(10, d)), y0 + height + 12, d, d == 0 ? " s" : "", x(std::pow(10, d)), y0, x(std::pow(10, d)),
-                y0 + height);
-            out += text;
+/// Seconds of both tables. The random methods: what cells drawn at random took, times the number of cells; analog from
+/// 20000 paths by 1 / error^2.
+bench::Panel measure_tables(double reference, std::size_t cells, json& out) {
+    bench::Panel panel{
+        "both default tables, processor seconds", {-1, 7}, std::vector<std::vector<bench::Point>>(kMethods)};
+    const auto report = [&](Method method, double target, double seconds, json more) {
+        panel.points[method].push_back({seconds, target});
+        more.update({{"method", kSeries[method].name}, {"error", target}, {"processor_s", seconds}});
+        out.push_back(more);
+        std::fflush(stdout);
+    };
+    for (const double target : {1e-2, 3e-3, 1e-3}) {
+        double start = now(), start_wall = wall();
+        Errors disc, slab;
+        solve_table(true, target, 0, disc);
+        const double disc_wall = wall() - start_wall;
+        solve_table(false, target, 0, slab);
+        const double seconds = now() - start, both_wall = wall() - start_wall;
+        const double worst = *std::max_element(disc.estimated.begin(), disc.estimated.end());
+        const double energy = *std::max_element(disc.energy.begin(), disc.energy.end());
+        const double worst_slab = *std::max_element(slab.estimated.begin(), slab.estimated.end());
+        std::printf(
+            "both tables, deterministic, target %.0e: %.1f s on %d threads (disc %.1f), %.1f processor seconds\n"
+            "  worst estimated error: disc %.1e, slab %.1e; disc's energy before scaling misses %.1e at most\n",
+            target, both_wall, omp_get_max_threads(), disc_wall, seconds, worst, worst_slab, energy);
+        json more = {{"wall_s", both_wall},
+                     {"threads", omp_get_max_threads()},
+                     {"worst_estimate", worst},
+                     {"worst_estimate_slab", worst_slab},
+                     {"worst_energy_before_scaling", energy}};
+        if (reference > 0) {
+            Errors e;
+            solve_table(true, target, reference, e);
+            std::vector<double> ratio;
+            for (std::size_t i = 0; i < e.actual.size(); ++i) ratio.push_back(e.estimated[i] / e.actual[i]);
+            const double most = *std::max_element(e.actual.begin(), e.actual.end());
+            const auto above = std::count_if(e.actual.begin(), e.actual.end(), [&](double x) { return x > target; });
+            std::printf(
+                "  true error of %zu lobes against target %.0e: median %.1e, worst %.1e, %td above the target; "
+                "estimated / true: median %.1f, least %.2f\n",
+                e.actual.size(), reference, median(e.actual), most, above, median(ratio),
+                *std::min_element(ratio.begin(), ratio.end()));
+            more.update({{"reference", reference}, {"median_error", median(e.actual)}, {"worst_error", most}});
         }
-        for (int d = -6; d <= 0; d += 2) {
-            std::snprintf(text, sizeof text,
-                          "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\">1e%d</text><line x1=\"%.1f\" y1=\"%.1f\" "
-                          "x2=\"%.1f\" y2=\"%.1f\" stroke=\"#ddd\"/>\n",
-                          x0 - 4, y(std::pow(10, d)) + 3, d, x0, y(std::pow(10, d)), x0 + width, y(std::pow(10, d)));
-            out += text;
+        report(kDeterministic, target, seconds, more);
+    }
+    const tables::Request axes = tables::default_request();
+    std::vector<std::vector<double>> cost(3);  // analog to error 1; random to 1e-2 and 3e-3
+    RandomStream random(7, 0, 0);
+    const auto pick = [&](const std::vector<double>& v, std::size_t first) {
+        return v[first + static_cast<std::size_t>(random.uniform() * static_cast<double>(v.size() - first))];
+    };
+    for (std::size_t i = 0; i < 2 * cells; ++i) {
+        const bool disc = i % 2 == 0;
+        // sigma = 0 is closed form.
+        const TableCell c{disc, pick(axes.sigma.values, 1), pick(axes.g.values, 0),
+                          pick(disc ? axes.h.values : axes.theta_i.values, 0)};
+        double start = now();
+        const double error = trace_analog(c, 20000).error;
+        cost[0].push_back((now() - start) * error * error);
+        for (const int k : {1, 2}) {
+            start = now();
+            trace_random(c, 1 << 22, k == 1 ? 1e-2 : 3e-3);
+            cost[static_cast<std::size_t>(k)].push_back(now() - start);
         }
-        for (int m = 0; m < kMethods; ++m) {
-            std::string path;
-            for (const Point& p : results[i].points[m]) {
-                std::snprintf(text, sizeof text, "%s%.1f,%.1f", path.empty() ? "" : " ", x(p.seconds), y(p.error));
-                path += text;
+    }
+    const double table_cells =
+        static_cast<double>((axes.sigma.size() - 1) * axes.g.size() * (axes.h.size() + axes.theta_i.size()));
+    const auto estimate = [&](Method method, double target, const std::vector<double>& each, double factor) {
+        double sum = 0, squares = 0;
+        for (const double x : each) sum += x, squares += x * x;
+        const double n = static_cast<double>(each.size()), mean = sum / n;
+        const double seconds = table_cells * factor * mean;
+        const double error = table_cells * factor * std::sqrt((squares / n - mean * mean) / (n - 1));
+        std::printf("both tables, %s, to %.0e: %.3g +- %.1g processor seconds, from %zu cells\n", kSeries[method].name,
+                    target, seconds, error, each.size());
+        report(method, target, seconds, {{"processor_s_error", error}, {"from_cells", each.size()}});
+    };
+    for (const double target : {1e-2, 3e-3, 1e-3}) estimate(kAnalog, target, cost[0], 1 / (target * target));
+    estimate(kRandom, 1e-2, cost[1], 1);
+    estimate(kRandom, 3e-3, cost[2], 1);
+    return panel;
+}
+
+// Random against deterministic ----------------------------------------------------------------------------------------
+
+constexpr int kRepetitions = 8;
+
+/// Two-sided p-value of Student's t with seven degrees of freedom (Abramowitz and Stegun 26.7.3).
+double student7_p(double t) {
+    const double theta = std::atan(std::abs(t) / std::sqrt(7.0)), c = std::cos(theta);
+    return 1 - 2 / pi * (theta + std::sin(theta) * (c + 2.0 / 3 * c * c * c + 8.0 / 15 * c * c * c * c * c));
+}
+
+/// Eight independent runs of the random solver per (sigma, g), each cell at another offset or inclination. Differences
+/// of their mean lobe from the deterministic one, projected on three functions of the bins, are noise if both are
+/// right: t-values of seven degrees, whose p-values fall evenly into twenty classes.
+/// @return whether they do, in all nine tests, at 1e-3 each
+bool compare(json& out) {
+    const tables::Request axes = tables::default_request();
+    const char* const functions[] = {"cos", "cos 4", "random signs"};
+    bool agree = true;
+    for (const bool disc : {true, false}) {
+        const std::vector<double>& along = disc ? axes.h.values : axes.theta_i.values;
+        const std::size_t sides = disc ? 1 : 2;
+        std::vector<std::vector<double>> p(3 * sides);
+        std::vector<double> excess;  // (true error^2 less stated error^2) over the latter
+        std::size_t skipped = 0;
+        for (std::size_t ig = 0; ig < axes.g.size(); ++ig) {
+            const bench::SliceSolver solver(disc, axes.g.values[ig], 1e-3, true);
+            for (std::size_t is = 0; is < axes.sigma.size(); ++is) {
+                const TableCell c{disc, axes.sigma.values[is], axes.g.values[ig],
+                                  along[(7 * is + 3 * ig) % along.size()]};
+                const bench::Profiles exact = solver.solve(c.sigma, {c.along})[0];
+                std::vector<bench::Profiles> found;
+                for (std::uint64_t r = 0; r < kRepetitions; ++r)
+                    found.push_back(bench::random_profiles(c, 256, r + 1, ig * axes.sigma.size() + is));
+                for (std::size_t side = 0; side < sides; ++side) {
+                    const std::vector<double>& truth = exact[side].lobe;
+                    double square[kRepetitions], stated[kRepetitions], all = 0;
+                    for (std::size_t r = 0; r < kRepetitions; ++r) {
+                        square[r] = std::pow(bench::relative_l2(found[r][side].lobe, truth), 2);
+                        all += stated[r] = std::pow(found[r][side].standard_error, 2);
+                    }
+                    // Where the noise is below what the deterministic solver promises there is nothing to see.
+                    if (std::sqrt(all / kRepetitions) < 5 * exact[side].standard_error + 1e-5) {
+                        ++skipped;
+                        continue;
+                    }
+                    // Of scale 1 by the other repetitions' errors, so that the mean is 0 if errors are honest.
+                    double sum = 0;
+                    for (std::size_t r = 0; r < kRepetitions; ++r)
+                        sum += (square[r] - stated[r]) / (all - stated[r]) * (kRepetitions - 1) / kRepetitions;
+                    excess.push_back(sum);
+                    for (std::size_t k = 0; k < 3; ++k) {
+                        RandomStream signs(99, is, ig);
+                        std::vector<double> value(kRepetitions, 0.0);
+                        for (std::size_t b = 0; b < truth.size(); ++b) {
+                            const double phi = 2 * pi * (double(b) + 0.5) / double(truth.size());
+                            const double f =
+                                k == 2 ? (signs.uniform() < 0.5 ? -1 : 1) : std::cos(k == 0 ? phi : 4 * phi);
+                            for (std::size_t r = 0; r < kRepetitions; ++r)
+                                value[r] += f * (found[r][side].lobe[b] - truth[b]);
+                        }
+                        double mean = 0, variance = 0;
+                        for (const double v : value) mean += v / kRepetitions;
+                        for (const double v : value) variance += (v - mean) * (v - mean) / (kRepetitions - 1);
+                        p[3 * side + k].push_back(student7_p(mean / std::sqrt(variance / kRepetitions)));
+                    }
+                }
             }
-            out += std::string("<polyline fill=\"none\" stroke-width=\"1.6\" stroke=\"") + kColours[m] +
-                   "\" points=\"" + path + "\"/>\n";
         }
+        double mean = 0, deviation = 0;
+        for (const double x : excess) mean += x / double(excess.size());
+        for (const double x : excess) deviation += (x - mean) * (x - mean);
+        deviation = std::sqrt(deviation) / double(excess.size());
+        std::printf(
+            "random against deterministic, %s: %zu (sigma, g), %zu lobes, %zu more below the other's error\n"
+            "  (true / stated error of the random solver)^2 - 1: %.3f +- %.3f\n",
+            disc ? "disc" : "slab", axes.sigma.size() * axes.g.size(), excess.size(), skipped, mean, deviation);
+        json tests;
+        for (std::size_t t = 0; t < p.size(); ++t) {
+            std::vector<double> counts(20, 0.0);
+            for (const double x : p[t]) counts[std::min<std::size_t>(19, static_cast<std::size_t>(20 * x))] += 1;
+            const double chi = test::chi_squared_p(counts, std::vector<double>(20, 0.05), double(p[t].size()));
+            const double least = *std::min_element(p[t].begin(), p[t].end());
+            // The most extreme of n: Bonferroni.
+            const bool good = chi > 1e-3 && least * double(p[t].size()) > 1e-3;
+            agree = agree && good;
+            const char* lobe = disc ? "lobe" : (t < 3 ? "back" : "forward");
+            std::printf("  %-7s on %-12s chi-squared p = %.3f, least p of %zu = %.1e: %s\n", lobe, functions[t % 3],
+                        chi, p[t].size(), least, good ? "noise" : "NOT noise");
+            tests.push_back({{"lobe", lobe},
+                             {"function", functions[t % 3]},
+                             {"chi_squared_p", chi},
+                             {"least_p", least},
+                             {"lobes", p[t].size()}});
+        }
+        std::fflush(stdout);
+        out.push_back({{"table", disc ? "azimuthal" : "longitudinal"},
+                       {"lobes", excess.size()},
+                       {"skipped", skipped},
+                       {"excess", mean},
+                       {"excess_error", deviation},
+                       {"tests", tests}});
     }
-    for (int m = 0; m < kMethods; ++m) {
-        std::snprintf(text, sizeof text, "<text x=\"%g\" y=\"%g\" fill=\"%s\" font-size=\"13\">%s</text>\n",
-                      60 + 110.0 * m, h * double(rows) + 14, kColours[m], kNames[m]);
-        out += text;
-    }
-    return out + "<text x=\"420\" y=\"" + std::to_string(int(h * double(rows)) + 14) +
-           "\" font-size=\"13\">relative L2 error of a lobe (720 bins) against seconds on one thread</text>\n</svg>\n";
-}
-
-bool save(const std::string& file, const std::string& text) {
-    if (file.empty()) return true;
-    std::FILE* out = std::fopen(file.c_str(), "w");
-    if (out == nullptr) return std::fprintf(stderr, "%s: cannot be written\n", file.c_str()), false;
-    std::fwrite(text.data(), 1, text.size(), out);
-    return std::fclose(out) == 0;
+    return agree;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
     std::string json_file, svg_file;
-    for (int i = 1; i < argc; ++i) {
-        if (std::strcmp(argv[i], "--json") == 0 && i + 1 < argc)
-            json_file = argv[++i];
-        else if (std::strcmp(argv[i], "--svg") == 0 && i + 1 < argc)
-            svg_file = argv[++i];
-        else
-            return std::fprintf(stderr, "usage: bench_simulation [--json FILE] [--svg FILE]\n"), 2;
+    bool cells_too = true, tables = false, compared = false;
+    double reference = 0;
+    std::size_t cells = 32;
+    CLI::App app("Run time against error of the solvers");
+    app.add_flag("!--no-cells", cells_too, "leave the twelve cells out");
+    app.add_flag("--tables", tables, "time both default tables too");
+    app.add_option("--reference", reference, "with --tables: target error of a finer grid to take true errors from");
+    app.add_option("--cells", cells, "with --tables: cells per table that the random methods' time is estimated from");
+    app.add_flag("--compare", compared, "random against deterministic over every (sigma, g) of both tables");
+    app.add_option("--json", json_file, "write the numbers to FILE");
+    app.add_option("--svg", svg_file, "draw them into FILE");
+    CLI11_PARSE(app, argc, argv);
+
+    json out = {{"instruction_set", tracer_target()}};
+    std::vector<bench::Panel> panels;
+    for (const TableCell& c : kCells) {
+        if (!cells_too) break;
+        panels.push_back(measure(c));
+        out["cells"].push_back({{"cell", panels.back().title}, {"seconds_error", to_json(panels.back().points)}});
     }
-    std::vector<Result> results;
-    for (const Cell& c : kCells) {
-        double seconds = 0;
-        const Lobes truth = solve(c, 1.5, seconds);
-        Result r{c, {}};
-        std::printf("%s\n", title(c).c_str());
-        for (int m = 0; m < kMethods; ++m) {
-            r.points[m] = measure(c, static_cast<Method>(m), truth);
-            std::printf("  %-14s", kNames[m]);
-            for (const Point& p : r.points[m]) std::printf("  %9.5f s %.2e", p.seconds, p.error);
-            std::printf("\n");
-            std::fflush(stdout);
-        }
-        results.push_back(r);
-    }
-    return save(json_file, to_json(results)) && save(svg_file, to_svg(results)) ? 0 : 1;
+    if (tables) panels.push_back(measure_tables(reference, cells, out["tables"]));
+    const bool agree = !compared || compare(out["compare"]);
+    if (!json_file.empty()) std::ofstream(json_file) << out.dump(1) << '\n';
+    if (!svg_file.empty()) std::ofstream(svg_file) << bench::svg(panels, kSeries);
+    return agree ? 0 : 1;
 }

@@ -1,6 +1,6 @@
 // The random solver by itself: scatterings per second, efficiency against the analog tracer over the default axes, and
 // z-scores against the deterministic solvers. All on one thread, measured in turn in one process.
-// Usage: bench_tracer [--cells N] [--zscores] [--json FILE]; --zscores visits all (sigma, g) of both tables (minutes).
+// Usage: bench_tracer [--cells N] [--json FILE]; --zscores visits all (sigma, g) of both tables (minutes).
 #include <algorithm>
 #include <cmath>
 #include <cstdarg>
@@ -12,9 +12,7 @@
 #include <vector>
 
 #include "sim2d/analog.hpp"
-#include "sim2d/disc_deterministic.hpp"
 #include "sim2d/random.hpp"
-#include "sim2d/slab_deterministic.hpp"
 #include "sim2d/tracer.hpp"
 #include "sim2d/tracer_kernel.hpp"
 #include "tables/request.hpp"
@@ -41,12 +39,6 @@ double seconds(int runs, Run&& run) {
     return best;
 }
 
-double relative_l2(const std::vector<double>& a, const std::vector<double>& b) {
-    double d = 0, n = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) d += (a[i] - b[i]) * (a[i] - b[i]), n += b[i] * b[i];
-    return std::sqrt(d / n);
-}
-
 double quantile(std::vector<double> v, double q) {
     std::sort(v.begin(), v.end());
     return v[std::min(v.size() - 1, static_cast<std::size_t>(q * static_cast<double>(v.size())))];
@@ -65,27 +57,35 @@ void write(const char* format, ...) {
 
 /// Walks with payments withheld: scattering, flights, compaction and the choice of who would be paid.
 void events_per_second() {
-    std::printf("Scatterings per second on one core, %s, walks without payments\n", tracer_target());
+    std::printf("Million scatterings per second on one core, walks without payments\n");
     json += "\"events\":[";
     const char* comma = "";
-    for (const Medium medium : {Medium::disc, Medium::slab})
-        for (const double sigma : {2.0, 16.0, 100.0}) {
-            TracerCell cell;
-            cell.medium = medium, cell.sigma = sigma, cell.g = 0.9, cell.h = 0.3, cell.theta_i = 0.3;
-            cell.plan.forced = 0, cell.plan.pay = 1e30f;
-            TracerSums sums;
-            WalkTracer tracer(cell);
-            std::uint64_t walks = static_cast<std::uint64_t>(4e6 / sigma);
-            const double t = seconds(5, [&] {
-                sums = {};
-                tracer.trace(0, 0, walks, sums);
-            });
-            const double rate = static_cast<double>(sums.scatterings) / t;
-            const char* name = medium == Medium::disc ? "disc" : "slab";
-            std::printf("  %s sigma %5.1f: %6.1f million\n", name, sigma, rate * 1e-6);
-            write("%s{\"medium\":\"%s\",\"sigma\":%g,\"per_second\":%.4g}", comma, name, sigma, rate), comma = ",";
-            std::fflush(stdout);
-        }
+    for (const std::string& target : tracer_targets()) {
+        set_tracer_target(target);
+        std::printf("  %-8s", target.c_str());
+        for (const Medium medium : {Medium::disc, Medium::slab})
+            for (const double sigma : {2.0, 16.0, 100.0}) {
+                TracerCell cell;
+                cell.medium = medium, cell.sigma = sigma, cell.g = 0.9, cell.h = 0.3, cell.theta_i = 0.3;
+                cell.plan.forced = 0, cell.plan.pay = 1e30f;
+                TracerSums sums;
+                WalkTracer tracer(cell);
+                const auto walks = static_cast<std::uint64_t>(4e6 / sigma);
+                const double t = seconds(5, [&] {
+                    sums = {};
+                    tracer.trace(0, 0, walks, sums);
+                });
+                const double rate = static_cast<double>(sums.scatterings) / t;
+                const char* name = medium == Medium::disc ? "disc" : "slab";
+                std::printf("  %s sigma %g: %.1f", name, sigma, rate * 1e-6);
+                write("%s{\"target\":\"%s\",\"medium\":\"%s\",\"sigma\":%g,\"per_second\":%.4g}", comma, target.c_str(),
+                      name, sigma, rate);
+                comma = ",";
+            }
+        std::printf("\n");
+        std::fflush(stdout);
+    }
+    set_tracer_target("");
     json += "]";
 }
 
@@ -156,76 +156,22 @@ void efficiency(std::size_t cells, double target) {
     json += "]";
 }
 
-/// (true error / standard error) over all (sigma, g) of the default axes, a few offsets of each. Its mean square is 1
-/// if the errors are honest and the two solvers agree to well below them.
-void z_scores() {
-    const tables::Request axes = tables::default_request();
-    std::printf("Random against deterministic, all %zu (sigma, g), errors in standard errors\n",
-                axes.sigma.size() * axes.g.size());
-    json += ",\"zscores\":[";
-    const char* comma = "";
-    for (const bool disc : {true, false}) {
-        const std::vector<double>& along = disc ? axes.h.values : axes.theta_i.values;
-        const std::vector<double> picked{along[0], along[along.size() / 2], along[along.size() - 2]};
-        std::vector<double> z;
-        double square = 0;
-        for (const double g : axes.g.values) {
-            const DiscSolver disc_solver(g);
-            const SlabSolver slab_solver(g);
-            for (const double sigma : axes.sigma.values) {
-                const auto exact = disc ? disc_solver.solve(sigma, picked, kBins) : std::vector<Profile>();
-                const auto exact_slab = disc ? std::vector<SlabProfile>() : slab_solver.solve(sigma, picked, kBins / 2);
-                for (std::size_t i = 0; i < picked.size(); ++i) {
-                    TracerOptions o;
-                    o.paths = 2048, o.cell = z.size();
-                    std::vector<Profile> found, truth;
-                    if (disc) {
-                        found = {trace_expected_disc(sigma, g, picked[i], kBins, o).profile}, truth = {exact[i]};
-                    } else {
-                        const SlabProfile p = trace_expected_slab(sigma, g, picked[i], kBins / 2, o).profile;
-                        found = {p.back, p.forward}, truth = {exact_slab[i].back, exact_slab[i].forward};
-                    }
-                    for (std::size_t k = 0; k < found.size(); ++k) {
-                        // Where the noise is below what the deterministic solver promises there is nothing to see.
-                        if (found[k].standard_error < 3 * truth[k].standard_error + 1e-4) continue;
-                        const double ratio = relative_l2(found[k].lobe, truth[k].lobe) / found[k].standard_error;
-                        z.push_back(ratio), square += ratio * ratio;
-                        write(
-                            "%s{\"medium\":\"%s\",\"sigma\":%.6g,\"g\":%.6g,\"along\":%.6g,\"error\":%.4g,\"z\":%.4g}",
-                            comma, disc ? "disc" : "slab", sigma, g, picked[i], found[k].standard_error, ratio);
-                        comma = ",";
-                    }
-                }
-            }
-        }
-        std::printf("  %s: %zu lobes, root mean square %.3f, median %.2f, 99 %% below %.2f, largest %.2f\n",
-                    disc ? "disc" : "slab", z.size(), std::sqrt(square / static_cast<double>(z.size())),
-                    quantile(z, 0.5), quantile(z, 0.99), quantile(z, 1));
-        std::fflush(stdout);
-    }
-    json += "]";
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
     std::size_t cells = 64;
-    bool zscores = false;
     std::string file;
     for (int i = 1; i < argc; ++i) {
         if (std::strcmp(argv[i], "--cells") == 0 && i + 1 < argc)
             cells = static_cast<std::size_t>(std::max(1L, std::atol(argv[++i])));
-        else if (std::strcmp(argv[i], "--zscores") == 0)
-            zscores = true;
         else if (std::strcmp(argv[i], "--json") == 0 && i + 1 < argc)
             file = argv[++i];
         else
-            return std::fprintf(stderr, "usage: bench_tracer [--cells N] [--zscores] [--json FILE]\n"), 2;
+            return std::fprintf(stderr, "usage: bench_tracer [--cells N] [--json FILE]\n"), 2;
     }
     json = "{";
     events_per_second();
     efficiency(cells, 5e-3);
-    if (zscores) z_scores();
     json += "}\n";
     if (file.empty()) return 0;
     std::FILE* out = std::fopen(file.c_str(), "w");

@@ -66,17 +66,21 @@ double share_error(double hits, double n) {
     return std::sqrt(q * (1 - q) / n);
 }
 
-/// The same for paths of weight w <= 1 in a medium that absorbs: sums of w, w^2 and w times the length.
+/// Its square is above 0 still, so that a lobe exists for every absorption; nothing shows of it otherwise.
+constexpr double kLeastWeight = 1e-150;
+
+/// Sums over paths of weight w <= 1, one of them per exit: of w, w^2 and w times the length.
 struct Weights {
     explicit Weights(std::size_t bins) : sum(bins, 0), square(bins, 0) {}
     std::vector<double> sum, square;
     double total = 0, squares = 0, length = 0, paths = 0;
 
-    void add(std::size_t b, double path_length, double w) {
+    void add(std::size_t b, double path_length, double w = 1) {
         sum[b] += w, square[b] += w * w;
         total += w, squares += w * w, length += w * path_length, ++paths;
     }
 
+    /// Density, error and mean length; the energy is the caller's.
     Profile profile(double width) const {
         Profile p;
         p.standard_error = 1;
@@ -84,38 +88,11 @@ struct Weights {
         double variance = 0, norm = 0;
         for (std::size_t b = 0; b < sum.size(); ++b) {
             p.lobe.push_back(sum[b] / (total * width));
-            variance += square[b] - sum[b] * sum[b] / paths;
+            if (sum[b] > 0) variance += sum[b] * (square[b] / sum[b] - sum[b] / paths);
             norm += sum[b] * sum[b];
         }
         p.standard_error = std::sqrt(variance / norm);
         p.mean_length = length / total;
-        return p;
-    }
-};
-
-struct Counts {
-    explicit Counts(std::size_t bins) : bin(bins, 0) {}
-    std::vector<std::uint64_t> bin;
-    std::uint64_t total = 0;
-    double length = 0;
-
-    void add(std::size_t b, double path_length) { ++bin[b], ++total, length += path_length; }
-
-    /// Density, error and mean length; the energy is the caller's.
-    Profile profile(double width) const {
-        Profile p;
-        p.standard_error = 1;
-        if (total == 0) return p;
-        const auto n = static_cast<double>(total);
-        double variance = 0, squares = 0;
-        for (const std::uint64_t count : bin) {
-            const auto c = static_cast<double>(count);
-            p.lobe.push_back(c / (n * width));
-            variance += c * (1 - c / n);
-            squares += c * c;
-        }
-        p.standard_error = std::sqrt(variance / squares);
-        p.mean_length = length / n;
         return p;
     }
 };
@@ -139,13 +116,17 @@ Exit walk_disc(Ray ray, double sigma, double g, RandomStream& random) {
 }
 
 Profile trace_disc(double sigma, double g, double h, std::size_t bins, const TraceOptions& options) {
+    return trace_disc(sigma, g, h, {0.0}, bins, options)[0];
+}
+
+std::vector<Profile> trace_disc(double sigma, double g, double h, const std::vector<double>& absorption,
+                                std::size_t bins, const TraceOptions& options) {
     check(sigma, g, bins, options);
     require(h >= -1 && h <= 1, "h: expected a value in [-1, 1]");
+    for (const double a : absorption) require(std::isfinite(a) && a >= 0, "absorption: expected finite values >= 0");
     const double half = std::sqrt((1 - h) * (1 + h)), chord = 2 * half;
-    require(std::isfinite(options.absorption) && options.absorption >= 0, "absorption: expected a finite value >= 0");
-    Counts counts(bins);
-    Weights weights(bins);
-    const bool absorbs = options.absorption > 0, forced = options.first == FirstCollision::forced;
+    const bool forced = options.first == FirstCollision::forced;
+    std::vector<Weights> weights(absorption.size(), Weights(bins));
     for (std::uint64_t path = 0; path < options.paths; ++path) {
         RandomStream random(options.seed, options.cell, path);
         const double t = forced ? forced_flight(sigma, chord, random) : free_flight(sigma, random);
@@ -154,31 +135,24 @@ Profile trace_disc(double sigma, double g, double h, std::size_t bins, const Tra
         advance(ray, t);
         scatter(ray, g, random);
         const Exit exit = walk_disc(ray, sigma, g, random);
-        const double phi = portable::atan2(exit.ray.direction.y, exit.ray.direction.x);
+        const double phi = portable::atan2(exit.ray.direction.y, exit.ray.direction.x), length = t + exit.length;
         const std::size_t bin = bin_of(phi, -pi, pi, bins);
-        const double length = t + exit.length;
-        if (absorbs)
-            weights.add(bin, length, portable::exp(-options.absorption * length));
-        else
-            counts.add(bin, length);
+        for (std::size_t j = 0; j < weights.size(); ++j)
+            weights[j].add(bin, length,
+                           absorption[j] > 0 ? std::max(portable::exp(-absorption[j] * length), kLeastWeight) : 1);
     }
-    const double width = 2 * pi / static_cast<double>(bins);
-    if (absorbs) {
-        Profile profile = weights.profile(width);
-        const auto n = static_cast<double>(options.paths);
-        const double mean = weights.total / n, scale = forced ? -portable::expm1(-sigma * chord) : 1;
-        profile.energy = scale * mean;
-        profile.energy_error = scale * std::sqrt(std::max(0.0, weights.squares / n - mean * mean) / n);
-        return profile;
+    const double width = 2 * pi / static_cast<double>(bins), n = static_cast<double>(options.paths);
+    const double scattered = -portable::expm1(-sigma * chord);  // the share that forced paths stand for
+    std::vector<Profile> profiles;
+    for (std::size_t j = 0; j < weights.size(); ++j) {
+        const Weights& w = weights[j];
+        Profile& p = profiles.emplace_back(w.profile(width));
+        const double mean = w.total / n, scale = forced ? scattered : 1;
+        p.energy = scale * mean;
+        p.energy_error = scale * std::sqrt(std::max(0.0, w.squares / n - mean * mean) / n);
+        if (absorption[j] == 0) p.energy_error = forced ? 0 : share_error(w.total, n);
     }
-    Profile profile = counts.profile(width);
-    profile.energy = -portable::expm1(-sigma * chord);
-    if (!forced) {
-        const auto n = static_cast<double>(options.paths);
-        profile.energy = static_cast<double>(counts.total) / n;
-        profile.energy_error = share_error(static_cast<double>(counts.total), n);
-    }
-    return profile;
+    return profiles;
 }
 
 SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_per_side, const TraceOptions& options) {
@@ -188,7 +162,7 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
     // inclination theta_i. It leaves at theta_r = asin(direction.y): the straight continuation is theta_r = -theta_i.
     const double mu = theta_i == pi / 2 || theta_i == -pi / 2 ? 0.0 : portable::cos(theta_i);
     const double chord = mu > 0 ? 2 / mu : std::numeric_limits<double>::infinity();
-    Counts back(bins_per_side), forward(bins_per_side);
+    Weights back(bins_per_side), forward(bins_per_side);
     for (std::uint64_t path = 0; path < options.paths; ++path) {
         RandomStream random(options.seed, options.cell, path);
         const bool forced = options.first == FirstCollision::forced;
@@ -214,14 +188,13 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
     }
     const double width = pi / static_cast<double>(bins_per_side);
     SlabProfile profile{back.profile(width), forward.profile(width), 0};
-    const auto scattered = static_cast<double>(back.total + forward.total), n = static_cast<double>(options.paths);
+    const double scattered = back.total + forward.total, n = static_cast<double>(options.paths);
     const bool forced = options.first == FirstCollision::forced;
     const double total = forced ? -portable::expm1(-sigma * chord) : scattered / n;
-    const auto share = [&](Profile& p, std::uint64_t count) {
+    const auto share = [&](Profile& p, double count) {
         if (!(sigma > 0) || !(scattered > 0)) return;
-        p.energy = static_cast<double>(count) / scattered * total;
-        p.energy_error =
-            forced ? total * share_error(static_cast<double>(count), n) : share_error(static_cast<double>(count), n);
+        p.energy = count / scattered * total;
+        p.energy_error = forced ? total * share_error(count, n) : share_error(count, n);
     };
     // In an empty slab directions along it have no end: the mean of 1 / cos diverges.
     if (!(sigma > 0)) profile.back.mean_length = profile.forward.mean_length = std::numeric_limits<double>::infinity();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "sim2d/profile.hpp"
 #include "sim2d/random.hpp"
@@ -18,16 +19,20 @@ struct TraceOptions {
     std::uint64_t seed = 1;
     std::uint64_t cell = 0;  ///< which cell: another cell gets other random numbers
     FirstCollision first = FirstCollision::forced;
-    double absorption = 0;  ///< trace_disc: paths count exp(-absorption length) [1 / disc radius], >= 0
 };
 
 /// C^N of a cell over `bins` bins of phi in (-pi, pi].
 /// @param sigma scattering coefficient [1 / disc radius], >= 0   @param g mean cosine, in (-1, 1)   @param h in [-1, 1]
 /// standard_error: sqrt(sum over bins of the variance of the bin) / |lobe|, for N scattered paths with n_b in bin b
 /// sum n_b (1 - n_b / N) / sum n_b^2. With no scattered path the lobe is empty, the energy 0 and the error 1.
-/// With absorption the same paths carry weights w: n_b becomes their sum in bin b, its variance sum w^2 - n_b^2 / N,
-/// and the energy is a sum of weights with a standard error; mean_length is weighted too.
 Profile trace_disc(double sigma, double g, double h, std::size_t bins, const TraceOptions& options);
+
+/// The same for every absorption of a list from one set of paths: a path of length L counts w = exp(-absorption L). n_b
+/// becomes the sum of w in bin b, its variance sum w^2 - n_b^2 / N; the energy is a sum of weights with a standard
+/// error, mean_length is weighted too. At 0 it is the profile above, byte for byte.
+/// @param absorption [1 / disc radius], each >= 0
+std::vector<Profile> trace_disc(double sigma, double g, double h, const std::vector<double>& absorption,
+                                std::size_t bins, const TraceOptions& options);
 
 /// C^M of a cell over `bins_per_side` bins of theta_r in (-pi/2, pi/2) on each side.
 /// @param theta_i inclination of the direction towards the light [radians], in [-pi/2, pi/2]

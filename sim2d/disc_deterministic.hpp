@@ -37,7 +37,8 @@ class DiscSolver {
     /// The same in a medium that absorbs too: scattered light weighted by exp(-sigma_a length).
     /// @param sigma_a absorption coefficient [1 / disc radius], >= 0
     /// energy (and the lobe of integral 1 beside it) is solved for; energy_error: from the two grids, without
-    /// estimate_error from two ways to compute it; mean_length: computed for sigma_a = 0 only, else 0.
+    /// estimate_error from two ways to compute it; mean_length: weighted too, -d log(energy) / d sigma_a,
+    /// to about 1e-3 of it and 3e-5 over the share of the collided light that leaves.
     std::vector<Profile> solve(double sigma, double sigma_a, const std::vector<double>& h, std::size_t bins) const;
 
   private:

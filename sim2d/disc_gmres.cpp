@@ -105,7 +105,7 @@ DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t
                 h(i, j)[k] = cosine[i][k] * x + sine[i][k] * y;
                 h(i + 1, j)[k] = cosine[i][k] * y - sine[i][k] * x;
             }
-            const double x = h(j, j)[k], y = h(j + 1, j)[k], r = std::hypot(x, y);
+            const double x = h(j, j)[k], y = h(j + 1, j)[k], r = std::sqrt(x * x + y * y);
             if (!(r > 0)) continue;  // the Krylov space of this mode is exhausted
             cosine[j][k] = x / r, sine[j][k] = y / r;
             h(j, j)[k] = r;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim2d/elementary.hpp"
 #include "sim2d/quadrature.hpp"
 
 namespace medulla::sim2d {
@@ -36,7 +37,7 @@ Matrix analyse(const double* psi, std::ptrdiff_t count, int part, std::size_t ha
     const double about_zero = cosine ? 1 : -1;
     const double about_grazing = part == real_sum || part == imaginary_sum ? 1 : -1;
     Matrix coefficients = Matrix::Zero(static_cast<Eigen::Index>(harmonics), count);
-    const auto value = [&](int n, double x) { return cosine ? std::cos(n * x) : std::sin(n * x); };
+    const auto value = [&](int n, double x) { return cosine ? portable::cos(n * x) : portable::sin(n * x); };
     for (std::ptrdiff_t panel = -1; panel + 1 < count; ++panel) {
         const double low = panel < 0 ? 0 : psi[panel], high = psi[panel + 1];
         // Points for a polynomial times a wave of n_max (high - low) radians.
@@ -57,7 +58,7 @@ Matrix analyse(const double* psi, std::ptrdiff_t count, int part, std::size_t ha
                     if (c != a) basis[a] *= (x - stencil[c].at) / (stencil[a].at - stencil[c].at);
             }
             // Harmonics of one part step by 2: f_n+2 = 2 cos(2 x) f_n - f_n-2.
-            const double twice = 2 * std::cos(2 * x);
+            const double twice = 2 * portable::cos(2 * x);
             double before = value(lowest - 2, x), now = value(lowest, x);
             for (std::size_t n = 0; n < harmonics; ++n) {
                 const double wave = n == 0 && lowest == 0 ? 0.5 * now : now;
@@ -92,7 +93,7 @@ std::vector<double> radii(const DiscGridSize& size) {
     double angle = 0;
     for (std::size_t i = step.size(); i-- > 0;) {
         angle += step[i] * (pi / 2) / sum;
-        radius.push_back(i == 0 ? 1.0 : std::sin(angle));
+        radius.push_back(i == 0 ? 1.0 : portable::sin(angle));
     }
     return radius;
 }
@@ -103,30 +104,31 @@ DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : size(wanted) {
     radius = radii(size);
     for (std::size_t i = 0; i < circles(); ++i) {
         const double inner = i == 0 ? 0 : radius[i - 1];
-        const double arc = std::acos(inner / radius[i]);
+        const double arc = portable::acos(inner / radius[i]);
         const int count = std::max(2, static_cast<int>(std::ceil(arc / size.gap)));
         const double intervals =
             i == 0 ? count - 0.5 : count;  // half a gap from the centre, one from the circle inside
         for (int m = count - 1; m >= 0; --m) {
-            offset.push_back(radius[i] * std::cos(arc * m / intervals));
+            offset.push_back(radius[i] * portable::cos(arc * m / intervals));
             ring.push_back(i);
         }
         first.push_back(psi.size());
-        for (const double b : offset) psi.push_back(std::atan2(b, std::sqrt((radius[i] - b) * (radius[i] + b))));
+        for (const double b : offset) psi.push_back(portable::atan2(b, std::sqrt((radius[i] - b) * (radius[i] + b))));
     }
     first.push_back(psi.size());
     stride = (static_cast<std::size_t>(size.modes) + 9) / 8 * 8;
     const int highest = static_cast<int>(stride) - 2;
     reach =
-        highest + (g == 0 ? 0 : static_cast<int>(std::ceil(std::min(400.0, std::log(1e-7) / std::log(std::abs(g))))));
+        highest +
+        (g == 0 ? 0 : static_cast<int>(std::ceil(std::min(400.0, portable::log(1e-7) / portable::log(std::abs(g))))));
     for (std::size_t i = 0; i < circles(); ++i)
         for (int part = 0; part < disc_parts; ++part) {
             const auto count = static_cast<std::ptrdiff_t>(chords(i));
             std::vector<DiscReal> wave;
             wave.reserve(chords(i) * all_harmonics());
             for (std::size_t m = 0; m < chords(i); ++m) {
-                const double x = psi[first[i] + m], twice = 2 * std::cos(2 * x);
-                const auto value = [&](int n) { return is_cosine(part) ? std::cos(n * x) : std::sin(n * x); };
+                const double x = psi[first[i] + m], twice = 2 * portable::cos(2 * x);
+                const auto value = [&](int n) { return is_cosine(part) ? portable::cos(n * x) : portable::sin(n * x); };
                 double before = value(parity(part) - 2), now = value(parity(part));
                 for (std::size_t n = 0; n < all_harmonics(); ++n) {
                     wave.push_back(static_cast<DiscReal>(now));

@@ -21,4 +21,7 @@ double disc_single_over_energy(double sigma, double g, double h, double phi);
 /// The sum of the averages times 2 pi / bins is the fraction of E that leaves after one collision.
 std::vector<double> disc_single_lobe(double sigma, double g, double h, std::size_t bins);
 
+/// Integral over phi of the same light times its path length [radii].
+double disc_single_length(double sigma, double g, double h);
+
 }  // namespace medulla::sim2d

@@ -27,6 +27,12 @@ class FlushDenormals {
 #endif
 };
 
+/// Every row's column 0: to = a x + b y.
+void combine(DiscField& to, double a, const DiscField& x, double b, const DiscField& y, std::size_t stride) {
+    for (std::size_t i = 0; i < to.size(); i += stride)
+        to[i] = static_cast<DiscReal>(a * static_cast<double>(x[i]) + b * static_cast<double>(y[i]));
+}
+
 }  // namespace
 
 DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a, double tolerance) {
@@ -62,6 +68,31 @@ DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a
     // The last chord is the tangent: I / F -> J(r = 1, psi = pi / 2) / sigma.
     exit.rest.push_back(transport.grazing(many.solution, 0).real());
     for (std::size_t k = 1; k < stride; ++k) exit.lobes.push_back(sigma * transport.grazing(many.solution, k));
+    exit.length = exit.rest;
+    if (sigma_a == 0) return exit;
+
+    // Column 0 again. T = uniform + sigma stream(S), S = p * T the solution above, is the integral of exp(-sigma_a s)
+    // over a path s, so W = 1 - sigma_a T is the mean of exp(-sigma_a L) and M, that of L exp(-sigma_a L), is the
+    // radiance of a source W: M = stream(W) + sigma stream(p * M). Weighting by t is streaming twice.
+    const std::size_t first = 8;
+    DiscField uniform(transport.size()), flown(transport.size()), twice(transport.size());
+    transport.uniform_radiance(uniform);
+    transport.stream(many.solution, flown, first);
+    combine(radiance, 1, uniform, sigma, flown, stride);  // T
+    transport.stream(radiance, twice, first);
+    combine(twice, 1, uniform, -sigma_a, twice, stride);  // stream(W)
+    DiscField lengths(transport.size());
+    transport.scatter(twice, lengths, first, 1);
+    for (std::size_t i = 0; i < lengths.size(); ++i)
+        if (i % stride > 0) lengths[i] = 0;
+    const DiscIteration one = gmres(collide, std::move(lengths), stride, tolerance);
+    combine(radiance, 1, one.solution, -sigma_a, flown, stride);
+    DiscField source_of_lengths = radiance;
+    transport.stream(source_of_lengths, radiance, first, rows.data());
+    for (std::size_t m = 0; m + 1 < grid.offset.size(); ++m)
+        exit.length[m] =
+            static_cast<double>(rows[2 * m * stride]) * extinction / disc_energy(extinction, grid.offset[m]);
+    exit.length.back() = transport.grazing(source_of_lengths, 0).real();
     return exit;
 }
 

@@ -14,8 +14,11 @@ namespace medulla::sim2d {
 struct DiscExit {
     std::vector<double> offset;               ///< b of the chords, increasing, in (0, 1]; the last is the tangent b = 1
     std::vector<std::complex<double>> lobes;  ///< c_k of chord m at m * modes + k
-    std::vector<double> rest;                 ///< of chord m: mean path (weighted) after the first collision [radii]
-    std::size_t modes = 0;                    ///< number of modes, k = 0 included
+    std::vector<double> rest;  ///< of chord m: mean of the integral of exp(-sigma_a s) over the path s after the first
+                               ///< collision [radii]
+    std::vector<double> length;  ///< of chord m: mean of (t + s) exp(-sigma_a s), t the first flight and s the path
+                                 ///< after it to the exit, less the mean of t [radii]
+    std::size_t modes = 0;       ///< number of modes, k = 0 included
     int iterations = 0;
     double residual = 0;  ///< relative to the right-hand side, the worst mode
 };

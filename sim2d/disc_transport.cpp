@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "sim2d/disc_lanes.hpp"
+#include "sim2d/elementary.hpp"
 
 namespace medulla::sim2d {
 namespace {
@@ -15,7 +16,7 @@ using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowM
 /// integral over u in (0, 1) of exp(-tau (1 - u)) u^j du, j < disc_taps: by recurrence in the direction that is stable.
 void exponential_moments(double tau, double moment[disc_taps]) {
     if (tau > 2) {
-        moment[0] = -std::expm1(-tau) / tau;
+        moment[0] = -portable::expm1(-tau) / tau;
         for (int j = 1; j < disc_taps; ++j) moment[j] = (1 - j * moment[j - 1]) / tau;
         return;
     }
@@ -41,7 +42,7 @@ std::vector<DiscTransport::Cell> DiscTransport::chord_cells(const std::vector<do
     for (std::size_t p = 0; p + 1 < points; ++p) {
         Cell& cell = cells[p];
         const double length = s[p + 1] - s[p], tau = extinction_ * length;
-        cell.transmission = static_cast<DiscReal>(std::exp(-tau));
+        cell.transmission = static_cast<DiscReal>(portable::exp(-tau));
         cell.taps = taps;
         cell.start = std::min(p < disc_taps / 2 ? 0 : p + 1 - disc_taps / 2, points - taps);
         double moment[disc_taps];
@@ -111,13 +112,15 @@ void DiscTransport::first_collision(DiscField& source) {
     int samples = 512;
     while (samples < 4 * top) samples *= 2;
     std::vector<double> table(static_cast<std::size_t>(samples));
-    for (int a = 0; a < samples; ++a) table[static_cast<std::size_t>(a)] = std::cos(2 * pi * a / samples);
+    for (int a = 0; a <= samples / 2; ++a)
+        table[static_cast<std::size_t>(a)] = table[static_cast<std::size_t>((samples - a) % samples)] =
+            portable::cos(2 * pi * a / samples);
     Matrix attenuation(samples / 2 + 1, static_cast<Eigen::Index>(grid_.circles()));
     for (Eigen::Index i = 0; i < attenuation.cols(); ++i)
         for (int a = 0; a <= samples / 2; ++a) {
             const double way =
                 way_from_rim(grid_.radius[static_cast<std::size_t>(i)], table[static_cast<std::size_t>(a)]);
-            attenuation(a, i) = std::exp(-extinction_ * way) * (a == 0 || a == samples / 2 ? 1 : 2) / samples;
+            attenuation(a, i) = portable::exp(-extinction_ * way) * (a == 0 || a == samples / 2 ? 1 : 2) / samples;
         }
     Matrix cosines(top, samples / 2 + 1);
     for (Eigen::Index k = 0; k < top; ++k)
@@ -141,10 +144,10 @@ void DiscTransport::first_collision(DiscField& source) {
 void DiscTransport::uniform_radiance(DiscField& radiance) const {
     for (std::size_t i = 0; i < grid_.circles(); ++i)
         for (std::size_t m = 0; m < grid_.chords(i); ++m) {
-            const double cosine = std::cos(grid_.psi[grid_.first[i] + m]);
+            const double cosine = portable::cos(grid_.psi[grid_.first[i] + m]);
             const auto at = [&](double c) {
                 const double way = way_from_rim(grid_.radius[i], c), tau = extinction_ * way;
-                return tau > 0 ? way * (-std::expm1(-tau) / tau) : way;
+                return tau > 0 ? way * (-portable::expm1(-tau) / tau) : way;
             };
             const double out = at(cosine), in = i + 1 == grid_.circles() ? 0 : at(-cosine);
             radiance[row(i, real_sum, m) * grid_.stride] = static_cast<DiscReal>(0.5 * (out + in));

@@ -151,6 +151,10 @@ inline double atan2(double y, double x) noexcept {
     return std::copysign(angle, y);
 }
 
+/// Arc functions of |x| <= 1 without cancellation at either end.
+inline double asin(double x) noexcept { return atan2(x, std::sqrt((1 - x) * (1 + x))); }
+inline double acos(double x) noexcept { return atan2(std::sqrt((1 - x) * (1 + x)), x); }
+
 /// The runtime's planar_hg_pdf (medulla/phase.hpp), |t| <= 2 pi.
 inline double planar_hg_pdf(double t, double g) noexcept {
     const double half = g < 0 ? cos(t / 2) : sin(t / 2), a = std::abs(g);

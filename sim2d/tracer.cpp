@@ -45,12 +45,19 @@ struct Side {
     std::size_t first, last;
 };
 
+/// Singly scattered light over the energy that is scattered in all at no absorption: density per bin, and the integral
+/// of it times the path length.
+struct Single {
+    std::vector<double> density;
+    double length = 0;
+};
+
 /// Estimates of a cell from what the randomisations paid; shares are of the energy that was scattered at least once.
 class Estimate {
   public:
-    /// @param single density of singly scattered light per bin   @param sides lobes to be normalised each
-    Estimate(std::vector<double> single, std::vector<Side> sides, bool mirror)
-        : single_(std::move(single)), sides_(std::move(sides)), mirror_(mirror) {
+    /// @param sides lobes to be normalised each   @param absorbed of the disc in media that absorb
+    Estimate(std::vector<double> single, std::vector<Side> sides, bool mirror, std::vector<Single> absorbed = {})
+        : single_(std::move(single)), sides_(std::move(sides)), mirror_(mirror), absorbed_(std::move(absorbed)) {
         width_ = 2 * pi / static_cast<double>(single_.size());
         for (const double s : single_) single_share_ += s * width_;
     }
@@ -58,68 +65,107 @@ class Estimate {
     struct Lobe {
         std::vector<double> density;
         double share = 0, share_error = 0, standard_error = 0;
+        double length = 0;  ///< of an absorbed lobe: mean path
     };
 
+    /// The sides' lobes, then the absorbed ones.
     /// @param sums one per randomisation, the same number of walks each
     std::vector<Lobe> lobes(const std::vector<TracerSums>& sums) const {
-        const std::size_t bins = single_.size(), count = sums.size();
-        std::vector<std::vector<double>> part(count);
-        std::vector<double> mean(bins, 0.0), total(count, 0.0);
-        double all = 0;
-        for (std::size_t r = 0; r < count; ++r) {
-            part[r] = sums[r].bins;
-            if (mirror_) symmetrise(part[r]);
-            for (std::size_t b = 0; b < bins; ++b) {
-                part[r][b] /= static_cast<double>(sums[r].walks);
-                mean[b] += part[r][b] / static_cast<double>(count);
-                total[r] += part[r][b] * width_;
-            }
-            all += total[r] / static_cast<double>(count);
-        }
+        const std::size_t count = sums.size();
+        const Paid paid = paid_by(sums, [](const TracerSums& s) { return s.bins; });
         // The multiply scattered share is known: 1 - single. Where that difference holds no digits, the sum is scaled.
         const double known = 1 - single_share_;
-        const bool exact = known > kKnown && all > 0;
-        const double scale = exact ? known / all : 1 / (single_share_ + all);
-        const double own = exact ? 1 : scale;  // of the singly scattered light
-        std::vector<Lobe> out(sides_.size());
-        for (std::size_t s = 0; s < sides_.size(); ++s) {
-            const Side side = sides_[s];
-            Lobe& lobe = out[s];
-            for (std::size_t b = side.first; b < side.last; ++b) {
-                lobe.density.push_back(own * single_[b] + scale * mean[b]);
-                lobe.share += lobe.density.back() * width_;
-            }
-            double squares = 0, variance = 0, share_variance = 0;
-            for (double& d : lobe.density) d /= lobe.share, squares += d * d;
-            // First-order deviations of the quotients above, per randomisation.
-            std::vector<double> deviation(lobe.density.size());
-            for (std::size_t r = 0; r < count; ++r) {
-                double drift = 0;
-                for (std::size_t i = 0; i < deviation.size(); ++i) {
-                    const std::size_t b = side.first + i;
-                    const double shape = exact ? mean[b] / all : lobe.density[i] * lobe.share;
-                    deviation[i] = scale * (part[r][b] - mean[b] - shape * (total[r] - all));
-                    drift += deviation[i] * width_;
-                }
-                share_variance += drift * drift;
-                for (std::size_t i = 0; i < deviation.size(); ++i) {
-                    const double e = (deviation[i] - lobe.density[i] * drift) / lobe.share;
-                    variance += e * e;
-                }
-            }
-            const double n = static_cast<double>(count), pairs = n * (n - 1);
-            lobe.share_error = sides_.size() > 1 ? std::sqrt(share_variance / pairs) : 0.0;
-            lobe.standard_error = std::sqrt(variance / pairs / squares + kRounding * kRounding);
-        }
+        Scale scale;
+        scale.exact = known > kKnown && paid.all > 0;
+        scale.paid = scale.exact ? known / paid.all : 1 / (single_share_ + paid.all);
+        scale.single = scale.exact ? 1 : scale.paid;
+        std::vector<Lobe> out;
+        for (const Side side : sides_) out.push_back(lobe_of(side, single_, paid, paid, scale));
+        if (sides_.size() == 1) out[0].share_error = 0;
         // Rounding must not leave a side with more than all of the energy.
         double shares = 0;
         for (const Lobe& lobe : out) shares += lobe.share;
         for (Lobe& lobe : out) lobe.share /= shares;
+        for (std::size_t j = 0; j < absorbed_.size(); ++j) {
+            const auto bins = static_cast<std::ptrdiff_t>(single_.size()),
+                       first = static_cast<std::ptrdiff_t>(j) * bins;
+            const Paid left = paid_by(sums, [&](const TracerSums& s) {
+                return std::vector<double>(s.absorbed.begin() + first, s.absorbed.begin() + first + bins);
+            });
+            out.push_back(lobe_of(sides_[0], absorbed_[j].density, left, paid, scale));
+            double length = 0;
+            for (const TracerSums& s : sums)
+                length += s.absorbed_length[j] / static_cast<double>(s.walks) / static_cast<double>(count);
+            out.back().length = (scale.single * absorbed_[j].length + scale.paid * length) / out.back().share;
+        }
         return out;
     }
 
   private:
     static constexpr double kKnown = 1e-3;
+
+    /// What walks paid: per randomisation and bin, its mean; its integrals, and the mean of those.
+    struct Paid {
+        std::vector<std::vector<double>> part;
+        std::vector<double> mean, total;
+        double all = 0;
+    };
+    /// Factors of what is paid and of singly scattered light; `exact`: the first makes paid light the known share.
+    struct Scale {
+        bool exact = false;
+        double paid = 1, single = 1;
+    };
+
+    template <class Bins>
+    Paid paid_by(const std::vector<TracerSums>& sums, Bins&& bins_of) const {
+        const std::size_t bins = single_.size(), count = sums.size();
+        Paid paid{std::vector<std::vector<double>>(count), std::vector<double>(bins, 0.0),
+                  std::vector<double>(count, 0.0)};
+        for (std::size_t r = 0; r < count; ++r) {
+            paid.part[r] = bins_of(sums[r]);
+            if (mirror_) symmetrise(paid.part[r]);
+            for (std::size_t b = 0; b < bins; ++b) {
+                paid.part[r][b] /= static_cast<double>(sums[r].walks);
+                paid.mean[b] += paid.part[r][b] / static_cast<double>(count);
+                paid.total[r] += paid.part[r][b] * width_;
+            }
+            paid.all += paid.total[r] / static_cast<double>(count);
+        }
+        return paid;
+    }
+
+    /// @param base what the same walks paid at no absorption: what `scale` is made of
+    Lobe lobe_of(const Side side, const std::vector<double>& single, const Paid& paid, const Paid& base,
+                 const Scale& scale) const {
+        const std::size_t count = paid.part.size();
+        Lobe lobe;
+        for (std::size_t b = side.first; b < side.last; ++b) {
+            lobe.density.push_back(scale.single * single[b] + scale.paid * paid.mean[b]);
+            lobe.share += lobe.density.back() * width_;
+        }
+        double squares = 0, variance = 0, share_variance = 0;
+        for (double& d : lobe.density) d /= lobe.share, squares += d * d;
+        // First-order deviations of the quotients above, per randomisation.
+        std::vector<double> deviation(lobe.density.size());
+        for (std::size_t r = 0; r < count; ++r) {
+            double drift = 0;
+            for (std::size_t i = 0; i < deviation.size(); ++i) {
+                const std::size_t b = side.first + i;
+                const double shape = scale.exact ? paid.mean[b] / base.all : lobe.density[i] * lobe.share;
+                deviation[i] = scale.paid * (paid.part[r][b] - paid.mean[b] - shape * (base.total[r] - base.all));
+                drift += deviation[i] * width_;
+            }
+            share_variance += drift * drift;
+            for (std::size_t i = 0; i < deviation.size(); ++i) {
+                const double e = (deviation[i] - lobe.density[i] * drift) / lobe.share;
+                variance += e * e;
+            }
+        }
+        const double n = static_cast<double>(count), pairs = n * (n - 1);
+        lobe.share_error = std::sqrt(share_variance / pairs);
+        lobe.standard_error = std::sqrt(variance / pairs / squares + kRounding * kRounding);
+        return lobe;
+    }
 
     void symmetrise(std::vector<double>& bins) const {
         for (const Side side : sides_)
@@ -130,6 +176,7 @@ class Estimate {
     std::vector<double> single_;
     std::vector<Side> sides_;
     bool mirror_;
+    std::vector<Single> absorbed_;
     double width_, single_share_ = 0;
 };
 
@@ -164,24 +211,58 @@ double mean_of(const std::vector<TracerSums>& sums, int which) {
     return length / walks;
 }
 
+/// (1 - exp(-x)) / x.
+double mean_transmission(double x) { return x > 0 ? -std::expm1(-x) / x : 1; }
+
+/// First collisions fall as exp(-(sigma + a) t), and leave over exp(-(sigma + a) d): the closed form at the extinction
+/// of both, which is over its own first collisions' energy, brought to that without absorption.
+Single absorbed_single(double sigma, double a, double g, double h, std::size_t bins) {
+    const double extinction = sigma + a, chord = 2 * std::sqrt((1 - h) * (1 + h));
+    const double ratio = mean_transmission(extinction * chord) / mean_transmission(sigma * chord);
+    Single single{disc_single_lobe(extinction, g, h, bins), ratio * disc_single_length(extinction, g, h)};
+    for (double& d : single.density) d *= ratio;
+    return single;
+}
+
 }  // namespace
 
 Traced<Profile> trace_expected_disc(double sigma, double g, double h, std::size_t bins, const TracerOptions& options) {
+    Traced<std::vector<Profile>> all = trace_expected_disc(sigma, g, h, {0.0}, bins, options);
+    return {std::move(all.profile[0]), all.paths, all.scatterings, all.reached};
+}
+
+Traced<std::vector<Profile>> trace_expected_disc(double sigma, double g, double h,
+                                                 const std::vector<double>& absorption, std::size_t bins,
+                                                 const TracerOptions& options) {
     check(sigma, g, bins, options);
     require(h >= -1 && h <= 1, "h: expected a value in [-1, 1]");
+    for (const double a : absorption) require(std::isfinite(a) && a >= 0, "absorption: expected finite values >= 0");
     TracerCell cell;
     cell.medium = Medium::disc;
     cell.sigma = std::max(sigma, kThin), cell.g = g, cell.h = h;
     cell.bins = static_cast<std::uint32_t>(bins), cell.seed = options.seed, cell.cell = options.cell;
     cell.plan = plan_of(cell);
-    const Estimate estimate(disc_single_lobe(cell.sigma, g, h, bins), {{0, bins}}, h == 0);
+    std::vector<Single> singles;
+    for (const double a : absorption)
+        if (a > 0) {
+            cell.absorption.push_back(a);
+            singles.push_back(absorbed_single(cell.sigma, a, g, h, bins));
+        }
+    const Estimate estimate(disc_single_lobe(cell.sigma, g, h, bins), {{0, bins}}, h == 0, std::move(singles));
     Run result = run(cell, estimate, options);
-    Traced<Profile> out;
+    Traced<std::vector<Profile>> out;
     out.paths = result.paths, out.scatterings = result.scatterings, out.reached = result.reached;
-    out.profile.lobe = std::move(result.lobes[0].density);
-    out.profile.standard_error = result.lobes[0].standard_error;
-    out.profile.energy = disc_energy(sigma, h);
-    out.profile.mean_length = mean_of(result.sums, 0);
+    const double energy = disc_energy(sigma, h);
+    std::size_t next = 1;
+    for (const double a : absorption) {
+        const Estimate::Lobe& lobe = result.lobes[a > 0 ? next++ : 0];
+        Profile& p = out.profile.emplace_back();
+        p.lobe = lobe.density;
+        p.standard_error = lobe.standard_error;
+        p.energy = a > 0 ? lobe.share * energy : energy;
+        p.energy_error = lobe.share_error * energy;
+        p.mean_length = a > 0 ? lobe.length : mean_of(result.sums, 0);
+    }
     return out;
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "sim2d/profile.hpp"
 
@@ -35,6 +36,15 @@ struct Traced {
 /// @param sigma scattering coefficient [1 / disc radius], >= 0   @param g mean cosine, in (-1, 1)   @param h in [-1, 1]
 /// @throws std::invalid_argument
 Traced<Profile> trace_expected_disc(double sigma, double g, double h, std::size_t bins, const TracerOptions& options);
+
+/// The same for every absorption of a list, from one set of walks: light that went a path of length L counts
+/// exp(-absorption L), singly scattered light in closed form. The energies above 0 absorption are a quotient too: of
+/// the walks' weighted light over their light, times E; energy_error is its standard error. Every cell meets
+/// target_error.
+/// @param absorption [1 / disc radius], each >= 0   @return a profile for each
+Traced<std::vector<Profile>> trace_expected_disc(double sigma, double g, double h,
+                                                 const std::vector<double>& absorption, std::size_t bins,
+                                                 const TracerOptions& options);
 
 /// C^M of a cell over `bins_per_side` bins of theta_r in (-pi/2, pi/2) on each side. Each side's standard_error and
 /// energy_error are its own; back + forward energy is the closed form. The worse of the two sides meets target_error.

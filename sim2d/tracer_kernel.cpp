@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <utility>
 
 #include "sim2d/random.hpp"
 #include "sim2d/tracer_state.hpp"
@@ -48,6 +50,12 @@ void directions(const TracerCell& cell, std::size_t step, std::size_t count, std
 /// Scattering orders fit 24 bits; the lattice's shifts take a block that no order reaches in practice.
 constexpr std::uint32_t kShiftBlock = 0xFFFFFFu;
 
+/// Compiled, and possible on this processor; asked once, since choosing one hides the others.
+const std::vector<std::int64_t>& targets() {
+    static const std::vector<std::int64_t> all = hwy::SupportedAndGeneratedTargets();
+    return all;
+}
+
 }  // namespace
 
 TracerCounter tracer_counter(const TracerCell& cell, std::uint32_t order, std::uint32_t randomisation,
@@ -87,6 +95,11 @@ WalkTracer::WalkTracer(const TracerCell& cell) : state_(new State) {
         directions(cell, 1, cell.bins + cell.plan.window, s.window_x, s.window_y);
         s.window_sum.assign(s.window_x.size(), 0.0f);
     }
+    for (const double absorption : cell.absorption)
+        s.absorbed_rate.push_back(static_cast<float>(-absorption * 1.4426950408889634));  // exp(x) = 2^(x / log 2)
+    s.absorbed_comb.assign(cell.absorption.size() * s.comb_sum.size(), 0.0f);
+    s.absorbed_window.assign(cell.absorption.size() * s.window_sum.size(), 0.0f);
+    s.absorbed_length.assign(cell.absorption.size() * kLaneMargin, 0.0f);
     s.walks.reserve(kBatch + kLaneMargin);
     s.pay.reserve(kBatch + kLaneMargin);
     s.shift.assign(kLatticeDims, 0);
@@ -98,6 +111,20 @@ void WalkTracer::trace(std::uint32_t randomisation, std::uint64_t first, std::ui
     State& s = *state_;
     const TracerCell& cell = s.cell;
     sums.bins.resize(cell.bins, 0.0);
+    sums.absorbed.resize(cell.absorption.size() * cell.bins, 0.0);
+    sums.absorbed_length.resize(cell.absorption.size(), 0.0);
+    const double width = 2 * pi / cell.bins;
+    // Floats hold one batch's sums only.
+    const auto flush = [&](float* comb_sum, float* window_sum, double* bins) {
+        const std::uint32_t comb = cell.plan.comb;
+        for (std::uint32_t b = 0; b < cell.bins; ++b)
+            bins[b] += static_cast<double>(comb_sum[std::size_t{b % comb} * s.comb_stride + b / comb]);
+        std::fill_n(comb_sum, s.comb_sum.size(), 0.0f);
+        for (std::size_t b = 0; b < s.window_sum.size(); ++b) {
+            if (b < cell.bins + cell.plan.window) bins[b % cell.bins] += static_cast<double>(window_sum[b]);
+            window_sum[b] = 0;
+        }
+    };
     for (std::uint32_t d = 0; d < kLatticeDims; ++d) {
         const TracerCounter c = tracer_counter(cell, kShiftBlock, randomisation, d);
         s.shift[d] = philox(c.counter, c.key[0], c.key[1])[0];
@@ -110,16 +137,12 @@ void WalkTracer::trace(std::uint32_t randomisation, std::uint64_t first, std::ui
         }
         HWY_DYNAMIC_DISPATCH(TraceBatch)(s, randomisation, n, sums);
         first += n, count -= n, sums.walks += n;
-        // Floats hold one batch's sums only.
-        const std::uint32_t comb = cell.plan.comb;
-        for (std::uint32_t b = 0; b < cell.bins; ++b) {
-            float& sum = s.comb_sum[std::size_t{b % comb} * s.comb_stride + b / comb];
-            sums.bins[b] += static_cast<double>(sum);
-        }
-        std::fill(s.comb_sum.begin(), s.comb_sum.end(), 0.0f);
-        for (std::size_t b = 0; b < s.window_sum.size(); ++b) {
-            if (b < cell.bins + cell.plan.window) sums.bins[b % cell.bins] += static_cast<double>(s.window_sum[b]);
-            s.window_sum[b] = 0;
+        flush(s.comb_sum.data(), s.window_sum.data(), sums.bins.data());
+        for (std::size_t j = 0; j < cell.absorption.size(); ++j) {
+            flush(s.absorbed_comb.data() + j * s.comb_sum.size(), s.absorbed_window.data() + j * s.window_sum.size(),
+                  sums.absorbed.data() + j * cell.bins);
+            for (std::size_t lane = j * kLaneMargin; lane < (j + 1) * kLaneMargin; ++lane)
+                sums.absorbed_length[j] += width * static_cast<double>(std::exchange(s.absorbed_length[lane], 0.0f));
         }
     }
 }
@@ -138,6 +161,21 @@ std::vector<std::array<std::uint32_t, 4>> tracer_words(const TracerCell& cell, s
 }
 
 const char* tracer_target() { return HWY_DYNAMIC_DISPATCH(Target)(); }
+
+std::vector<std::string> tracer_targets() {
+    std::vector<std::string> names;
+    for (const std::int64_t target : targets()) names.push_back(hwy::TargetName(target));
+    return names;
+}
+
+void set_tracer_target(const std::string& name) {
+    std::int64_t chosen = 0;  // Highway's word for "as the processor has it"
+    for (const std::int64_t target : targets())
+        if (hwy::TargetName(target) == name) chosen = target;
+    if (chosen == 0 && !name.empty()) throw std::invalid_argument("instruction set: not one of this processor's");
+    hwy::SetSupportedTargetsForTest(chosen);
+    hwy::GetChosenTarget().DeInit();  // chosen anew at the next call
+}
 
 }  // namespace medulla::sim2d
 #endif

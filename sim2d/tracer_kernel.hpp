@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace medulla::sim2d {
@@ -33,6 +34,7 @@ struct TracerCell {
     std::uint32_t bins = 720;  ///< of the full circle; slab: even
     std::uint64_t seed = 1, cell = 0;
     TracerPlan plan;
+    std::vector<double> absorption = {};  ///< disc: further sums of the same walks, light times exp(-absorption length)
 };
 
 /// The plan that measured best for a cell like this one.
@@ -42,6 +44,8 @@ TracerPlan plan_of(const TracerCell& cell);
 struct TracerSums {
     std::vector<double> bins;   ///< density per radian of the light scattered twice and more
     double length[2] = {0, 0};  ///< disc: path length of all scattered light, [0]; slab: of what `bins` holds, per side
+    std::vector<double> absorbed = {};         ///< [absorption][bins], as `bins`
+    std::vector<double> absorbed_length = {};  ///< [absorption]: path length of what `absorbed` holds
     std::uint64_t walks = 0, scatterings = 0, deposits = 0;
 };
 
@@ -74,7 +78,12 @@ struct TracerCounter {
 TracerCounter tracer_counter(const TracerCell& cell, std::uint32_t order, std::uint32_t randomisation,
                              std::uint32_t walk) noexcept;
 
-/// Instruction set that the kernel runs on here.
+/// Instruction set that the kernel runs on, and all that it could run on here, the best first.
 const char* tracer_target();
+std::vector<std::string> tracer_targets();
+
+/// From now on the kernel runs on that one of tracer_targets(), "" for the best. For tests and benchmarks: not while
+/// another thread traces.
+void set_tracer_target(const std::string& name);
 
 }  // namespace medulla::sim2d

@@ -66,6 +66,17 @@ HWY_INLINE VF Escaping(const WalkTracer::State& st, const Vertex& v, VF ux, VF u
     return hn::Div(hn::Mul(v.weight, Exp2(hn::Mul(distance, Constant(-st.sigma * kLog2E)))), q);
 }
 
+/// The same deposit in media that absorb: times exp(-absorption path), into sums that lie `stride` apart.
+HWY_INLINE void DepositAbsorbed(WalkTracer::State& st, VF value, VF path, float* sum, std::size_t stride) {
+    const F f;
+    for (std::size_t j = 0; j < st.absorbed_rate.size(); ++j) {
+        const VF left = hn::Mul(value, Exp2(hn::Mul(path, Constant(st.absorbed_rate[j]))));
+        hn::StoreU(hn::Add(hn::LoadU(f, sum + j * stride), left), f, sum + j * stride);
+        float* length = st.absorbed_length.data() + j * kLaneMargin;
+        hn::StoreU(hn::MulAdd(left, path, hn::LoadU(f, length)), f, length);
+    }
+}
+
 /// Deposits of one vertex into the bins of its comb, and of its window. `length`: slab, sums of light times path.
 template <Medium M, bool kWindow>
 HWY_INLINE void PayOne(WalkTracer::State& st, std::size_t i, VF length[2]) {
@@ -77,7 +88,8 @@ HWY_INLINE void PayOne(WalkTracer::State& st, std::size_t i, VF length[2]) {
     Vertex v{hn::Set(f, p.far_x[i]),   hn::Set(f, p.far_y[i]),   hn::Set(f, M == Medium::disc ? p.s[i] : p.x[i]),
              hn::Set(f, 2 - p.x[i]),   hn::Set(f, p.far_dx[i]),  hn::Set(f, p.far_dy[i]),
              hn::Set(f, p.cos_far[i]), hn::Set(f, p.sin_far[i]), hn::Set(f, p.weight[i] * static_cast<float>(comb))};
-    const VF so_far = hn::Set(f, p.y[i]);
+    const VF so_far = hn::Set(f, M == Medium::disc ? p.length[i] : p.y[i]);
+    const bool absorbs = M == Medium::disc && !st.absorbed_rate.empty();
     VF distance;
     MF forward = hn::Lt(so_far, so_far);
     float* sum = st.comb_sum.data() + static_cast<std::size_t>(p.offset[i]) * st.comb_stride;
@@ -100,6 +112,9 @@ HWY_INLINE void PayOne(WalkTracer::State& st, std::size_t i, VF length[2]) {
             length[1] = hn::Add(length[1], hn::IfThenElseZero(forward, moment));
         }
         hn::StoreU(hn::Add(hn::LoadU(f, sum + k), value), f, sum + k);
+        if (absorbs)
+            DepositAbsorbed(st, hn::IfThenElseZero(hn::FirstN(f, st.comb_count - k), value), hn::Add(so_far, distance),
+                            st.absorbed_comb.data() + (sum + k - st.comb_sum.data()), st.comb_sum.size());
     }
     if (!kWindow) return;
     const std::size_t k0 = static_cast<std::size_t>(p.window[i]);
@@ -117,6 +132,9 @@ HWY_INLINE void PayOne(WalkTracer::State& st, std::size_t i, VF length[2]) {
             length[1] = hn::Add(length[1], hn::IfThenElseZero(forward, moment));
         }
         hn::StoreU(hn::Add(hn::LoadU(f, near_sum + k), value), f, near_sum + k);
+        if (absorbs)
+            DepositAbsorbed(st, value, hn::Add(so_far, distance), st.absorbed_window.data() + k0 + k,
+                            st.window_sum.size());
     }
 }
 
@@ -127,6 +145,7 @@ std::size_t Choose(WalkTracer::State& st, std::size_t count) {
     const Walks& w = st.walks;
     Payments& p = st.pay;
     const VF rate = Constant(-st.sigma * kLog2E), beta = Constant(st.cell.plan.turned), flip = Constant(st.flip);
+    const bool absorbs = M == Medium::disc && !st.absorbed_rate.empty();
     std::size_t out = 0;
     for (std::size_t i = 0; i < count; i += hn::Lanes(f)) {
         const VF x = hn::LoadU(f, &w.x[i]), y = hn::LoadU(f, &w.y[i]), s = hn::LoadU(f, &w.s[i]);
@@ -145,6 +164,7 @@ std::size_t Choose(WalkTracer::State& st, std::size_t count) {
             squeeze.Store(hn::LoadU(U(), &w.place[i]), &p.place[out]);
         squeeze.Store(x, &p.x[out]), squeeze.Store(y, &p.y[out]), squeeze.Store(s, &p.s[out]);
         squeeze.Store(d.x, &p.far_dx[out]), squeeze.Store(d.y, &p.far_dy[out]);
+        if (absorbs) squeeze.Store(hn::LoadU(f, &w.length[i]), &p.length[out]);
         out += hn::CountTrue(f, paid);
     }
     return out;
@@ -210,6 +230,7 @@ double Start(WalkTracer::State& st, std::size_t count) {
             hn::StoreU(hn::Sub(t, Constant(st.half)), f, &w.x[i]);
             hn::StoreU(Constant(st.h), f, &w.y[i]);
             hn::StoreU(hn::Mul(t, hn::Sub(Constant(st.chord), t)), f, &w.s[i]);
+            hn::StoreU(t, f, &w.length[i]);
             const MF valid = hn::FirstN(f, count - i);
             length += static_cast<double>(hn::GetLane(hn::SumOfLanes(f, hn::IfThenElseZero(valid, t))));
         } else {
@@ -235,7 +256,7 @@ std::size_t Fly(WalkTracer::State& st, std::uint32_t order, std::uint32_t random
     const std::uint32_t counter[4] = {(order & 0xFFFFFFu) | randomisation << 24, 0,
                                       static_cast<std::uint32_t>(st.cell.cell),
                                       static_cast<std::uint32_t>(st.cell.cell >> 32)};
-    const bool lattice = 2 * order < kLatticeDims;
+    const bool lattice = 2 * order < kLatticeDims, absorbs = M == Medium::disc && !st.absorbed_rate.empty();
     const VF per_sigma = Constant(1 / st.sigma), zero = hn::Zero(f);
     VF length = zero;
     std::size_t out = 0;
@@ -290,6 +311,7 @@ std::size_t Fly(WalkTracer::State& st, std::uint32_t order, std::uint32_t random
         const Squeeze squeeze(alive);
         squeeze.Store(x, &w.x[out]), squeeze.Store(y, &w.y[out]);
         if (M == Medium::disc) squeeze.Store(s, &w.s[out]);
+        if (absorbs) squeeze.Store(hn::Add(hn::LoadU(f, &w.length[i]), t), &w.length[out]);
         squeeze.Store(d.x, &w.dx[out]), squeeze.Store(d.y, &w.dy[out]);
         squeeze.Store(weight, &w.w[out]), squeeze.Store(chance, &w.chance[out]);
         squeeze.Store(straight, &w.straight[out]);

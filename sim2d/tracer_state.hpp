@@ -19,11 +19,12 @@ inline constexpr std::uint32_t kLatticeDims = 25;
 struct Walks {
     std::vector<float> x, y, s, dx, dy, w, straight,
         chance;  ///< straight: way out along the phase function's peak; chance: uniform number that decides a payment
+    std::vector<float> length;                   ///< disc: path so far, kept for absorption only
     std::vector<std::uint32_t> index, reversed;  ///< of the walk; its bits in reverse order
     std::vector<std::uint32_t> place;            ///< random word: where in its bin and comb a deposit lies
 
     void reserve(std::size_t n) {
-        for (auto* v : {&x, &y, &s, &dx, &dy, &w, &straight, &chance}) v->assign(n, 0.0f);
+        for (auto* v : {&x, &y, &s, &dx, &dy, &w, &straight, &chance, &length}) v->assign(n, 0.0f);
         for (auto* v : {&index, &reversed, &place}) v->assign(n, 0u);
     }
 };
@@ -31,14 +32,14 @@ struct Walks {
 /// Vertices to be paid out. "Near" is turned back by the offset in the
 /// bin, "far" by that and the comb's offset.
 struct Payments {
-    std::vector<float> weight, chance, x, y, s, far_x, far_y, far_dx, far_dy, near_x, near_y, near_dx, near_dy, cos_far,
-        sin_far, cos_near, sin_near;
+    std::vector<float> weight, chance, x, y, s, length, far_x, far_y, far_dx, far_dy, near_x, near_y, near_dx, near_dy,
+        cos_far, sin_far, cos_near, sin_near;
     std::vector<std::int32_t> offset, window;
     std::vector<std::uint32_t> place;
 
     void reserve(std::size_t n) {
-        for (auto* v : {&weight, &chance, &x, &y, &s, &far_x, &far_y, &far_dx, &far_dy, &near_x, &near_y, &near_dx,
-                        &near_dy, &cos_far, &sin_far, &cos_near, &sin_near})
+        for (auto* v : {&weight, &chance, &x, &y, &s, &length, &far_x, &far_y, &far_dx, &far_dy, &near_x, &near_y,
+                        &near_dx, &near_dy, &cos_far, &sin_far, &cos_near, &sin_near})
             v->assign(n, 0.0f);
         for (auto* v : {&offset, &window}) v->assign(n, 0);
         place.assign(n, 0u);
@@ -68,6 +69,8 @@ struct WalkTracer::State {
     std::vector<float> comb_x, comb_y;              ///< directions of the bins' lower ends, every comb-th
     std::vector<float> window_x, window_y;          ///< of all bins, continued by a window's length
     std::vector<float> comb_sum, window_sum;
+    /// Per absorption: -absorption / log 2; sums as comb_sum, window_sum; lanes of light times path.
+    std::vector<float> absorbed_rate, absorbed_comb, absorbed_window, absorbed_length;
     std::vector<std::uint32_t> shift;  ///< of the lattice, per dimension, of the present randomisation
     Walks walks;
     Payments pay;

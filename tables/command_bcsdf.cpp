@@ -68,7 +68,7 @@ void run_bcsdf(const BcsdfWords& words) {
     nlohmann::ordered_json json;
     double sum[3] = {};
     if (!words.json)
-        fmt::print("{:<5} {:>12}  {:>12}  {:>12}\n", "lobe", "M [1/rad]", "N [1/rad]", "M N / cos^2 theta_i");
+        fmt::print("{:<5} {:>12}  {:>12}  {:>12}\n", "lobe", "M [1/rad]", "N [1/rad]", "M N / cos^2 theta_i [1/rad^2]");
     for (int lobe = 0; lobe < lobe_count; ++lobe) {
         double N[3], value[3];
         for (int c = 0; c < 3; ++c) {
@@ -93,26 +93,33 @@ struct PresetWords {
     bool json = false;
 };
 
+/// The number that is printed: 0.88 rather than the float next to it.
+double as_printed(float x) { return std::stod(fmt::format("{}", x)); }
+
 void run_presets(const PresetWords& words) {
     nlohmann::ordered_json json = nlohmann::ordered_json::array();
-    if (!words.json)
-        fmt::print("{:<10} {:>6} {:>6} {:>6} {:>7} {:>7} {:>8} {:>8} {:>8} {:>5} {:>6}\n", "name", "kappa", "eta",
-                   "alpha", "beta_m", "beta_n", "sigma_ca", "sigma_ms", "sigma_ma", "g", "layers");
+    constexpr const char* line = "{:<10} {:>6} {:>6} {:>6} {:>7} {:>7} {:>8} {:>8} {:>8} {:>5} {:>6}\n";
+    if (!words.json) {
+        fmt::print(line, "name", "kappa", "eta", "alpha", "beta_m", "beta_n", "sigma_ca", "sigma_ms", "sigma_ma", "g",
+                   "layers");
+        // Sigmas are per fibre radius.
+        fmt::print(line, "", "", "", "deg", "deg", "deg", "1/r", "1/r", "1/r", "", "");
+    }
     for (const FurPreset& p : fur_presets) {
         json.push_back({{"name", p.name},
-                        {"kappa", p.kappa},
-                        {"eta", p.eta},
-                        {"alpha", p.alpha},
-                        {"beta_m", p.beta_m},
-                        {"beta_n", p.beta_n},
-                        {"sigma_ca", p.sigma_ca},
-                        {"sigma_ms", p.sigma_ms},
-                        {"sigma_ma", p.sigma_ma},
-                        {"g", p.g},
-                        {"layers", p.layers}});
+                        {"kappa", as_printed(p.kappa)},
+                        {"eta", as_printed(p.eta)},
+                        {"alpha", as_printed(p.alpha)},
+                        {"beta_m", as_printed(p.beta_m)},
+                        {"beta_n", as_printed(p.beta_n)},
+                        {"sigma_ca", as_printed(p.sigma_ca)},
+                        {"sigma_ms", as_printed(p.sigma_ms)},
+                        {"sigma_ma", as_printed(p.sigma_ma)},
+                        {"g", as_printed(p.g)},
+                        {"layers", as_printed(p.layers)}});
         if (!words.json)
-            fmt::print("{:<10} {:>6} {:>6} {:>6} {:>7} {:>7} {:>8} {:>8} {:>8} {:>5} {:>6}\n", p.name, p.kappa, p.eta,
-                       p.alpha, p.beta_m, p.beta_n, p.sigma_ca, p.sigma_ms, p.sigma_ma, p.g, p.layers);
+            fmt::print(line, p.name, p.kappa, p.eta, p.alpha, p.beta_m, p.beta_n, p.sigma_ca, p.sigma_ms, p.sigma_ma,
+                       p.g, p.layers);
     }
     if (words.json) fmt::print("{}\n", nlohmann::ordered_json{{"presets", json}}.dump());
 }
@@ -142,7 +149,7 @@ void add_bcsdf(CLI::App& app, Action& action) {
 
 void add_presets(CLI::App& app, Action& action) {
     add_command<PresetWords>(
-        app, action, "presets", "the animals of Table 4 (angles in degrees)",
+        app, action, "presets", "the animals of Table 4 (angles in degrees, sigma per fibre radius)",
         [](CLI::App& command, PresetWords& words) { command.add_flag("--json", words.json, "print one JSON object"); },
         run_presets);
 }

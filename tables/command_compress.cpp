@@ -26,7 +26,7 @@ const char* mirror_name(Mirror mirror) {
     return mirror == Mirror::none ? "whole" : (mirror == Mirror::even ? "even" : "odd");
 }
 
-nlohmann::ordered_json to_json(const TableReport& report) {
+nlohmann::ordered_json report_json(const TableReport& report) {
     nlohmann::ordered_json json = {{"relative_l2_of_factors", report.fit_error},
                                    {"relative_l2_of_exit_spline", report.exit_error},
                                    {"relative_l2_of_input_noise", report.noise}};
@@ -82,11 +82,14 @@ void run_compress(const CompressWords& words) {
         larger = compress(tables, options, input);
     }
     if (words.json) {
-        nlohmann::ordered_json json = {
-            {"output", output}, {"bytes", result.pack.size()}, {"seconds", result.solve_seconds}};
+        nlohmann::ordered_json json = {{"output", output},
+                                       {"bytes", result.pack.size()},
+                                       {"seconds", result.solve_seconds},
+                                       {"cpu_seconds", result.cpu_seconds}};
         for (const TableReport& report : result.tables)
-            json["factors"][medulla::tables::name_of(report.kind)] = to_json(report);
+            json["factors"][medulla::tables::name_of(report.kind)] = report_json(report);
         json["errors"] = to_json(result.errors);
+        json["degeneracy"] = to_json(result.degeneracy);
         if (larger) json["max_bytes_153600"] = {{"bytes", larger->pack.size()}, {"errors", to_json(larger->errors)}};
         fmt::print("{}\n", json.dump());
         return;
@@ -101,7 +104,9 @@ void run_compress(const CompressWords& words) {
                        part.solve.degeneracy.norm_ratio);
     }
     print(result.errors);
-    fmt::print("{}: {} bytes in {:.2f} s\n", output, result.pack.size(), result.solve_seconds);
+    print(result.degeneracy);
+    fmt::print("{}: {} bytes in {:.2f} s ({:.2f} s of processor time)\n", output, result.pack.size(),
+               result.solve_seconds, result.cpu_seconds);
     if (!larger) return;
     std::string errors;
     for (const LobeError& error : larger->errors)
@@ -127,22 +132,48 @@ void run_diff(const DiffWords& words) {
         candidate->check(kind, low, words.b);
         candidate->check(kind, high, words.b);
     }
-    const std::vector<LobeError> errors = compare(*reference, *candidate);
+    std::vector<LobeError> errors;
+    try {
+        errors = compare(*reference, *candidate);
+    } catch (const Error& error) {
+        throw Error("{} and {}: {}", words.a, words.b, error.what());
+    }
     if (errors.empty()) throw Error("{} and {}: expected a table that both have, found none", words.a, words.b);
-    if (words.json)
-        fmt::print("{}\n", nlohmann::ordered_json{{"errors", to_json(errors)}}.dump());
-    else
-        print(errors);
+    PackDegeneracy degeneracy;
+    if (words.b == "default" || !is_hdf5(words.b)) {
+        const std::vector<unsigned char> bytes = read_pack(words.b);
+        degeneracy = degeneracy_of(open_pack(bytes.data(), bytes.size()).pack);
+    }
+    if (words.json) {
+        nlohmann::ordered_json json = {{"errors", to_json(errors)}};
+        if (!degeneracy.empty()) json["degeneracy"] = to_json(degeneracy);
+        fmt::print("{}\n", json.dump());
+        return;
+    }
+    print(errors);
+    print(degeneracy);
 }
 
 }  // namespace
 
 nlohmann::ordered_json to_json(const std::vector<LobeError>& errors) {
     nlohmann::ordered_json json;
-    for (const LobeError& error : errors)
-        json[name_of(error.kind)] = {{"relative_l2", error.relative}, {"worst_lobe", error.worst},
-                                     {"worst_at", error.worst_at},    {"energy_error", error.energy},
-                                     {"least_value", error.least},    {"lobes", error.lobes}};
+    for (const LobeError& error : errors) {
+        nlohmann::ordered_json& one = json[name_of(error.kind)];
+        one = {{"relative_l2", error.relative}, {"worst_lobe", error.worst},  {"worst_at", error.worst_at},
+               {"energy_error", error.energy},  {"least_value", error.least}, {"lobes", error.lobes}};
+        if (error.survival) one["survival_error"] = *error.survival;
+        one["noise"] = error.noise;
+        one["relative_l2_with_noise"] = error.claim, one["worst_lobe_with_noise"] = error.worst_claim;
+        if (error.kind != TableKind::azimuthal) one["back_share_error"] = error.back_share;
+    }
+    return json;
+}
+
+nlohmann::ordered_json to_json(const PackDegeneracy& degeneracy) {
+    nlohmann::ordered_json json;
+    for (const auto& [kind, d] : degeneracy)
+        json[name_of(kind)] = {{"least_cosine", d.least_cosine}, {"norm_ratio", d.norm_ratio}};
     return json;
 }
 
@@ -151,6 +182,24 @@ void print(const std::vector<LobeError>& errors) {
     for (const LobeError& error : errors)
         fmt::print("{:<22} {:>12.3e} {:>12.3e} {:>14.1e}  {}\n", name_of(error.kind), error.relative, error.worst,
                    error.energy, error.worst_at);
+    for (const LobeError& error : errors)
+        if (error.survival)
+            fmt::print("{}: greatest error of the share that absorption leaves {:.1e}\n", name_of(error.kind),
+                       *error.survival);
+    for (const LobeError& error : errors)
+        if (error.noise > 0)
+            fmt::print("{}: the reference's noise is {:.1e}; with it {:.3e}, worst lobe {:.3e}{}\n",
+                       name_of(error.kind), error.noise, error.claim, error.worst_claim,
+                       error.relative < error.noise ? ": no error below the noise is known" : "");
+    for (const LobeError& error : errors)
+        if (error.kind == TableKind::longitudinal_back)
+            fmt::print("share of energy that leaves backward: off by at most {:.1e}\n", error.back_share);
+}
+
+void print(const PackDegeneracy& degeneracy) {
+    for (const auto& [kind, d] : degeneracy)
+        fmt::print("{}: component norms add up to {:.1f} times the table's, least cosine {:.3f}\n", name_of(kind),
+                   d.norm_ratio, d.least_cosine);
 }
 
 void add_compress(CLI::App& app, Action& action) {

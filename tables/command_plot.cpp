@@ -33,16 +33,19 @@ double nearest(const std::vector<Axis>& axes, const std::string& name, double wa
     return 0;
 }
 
-/// One panel: lobes of every file at three offsets or inclinations of one (sigma, g).
+/// One panel: lobes of every file at three offsets or inclinations of one (sigma, g) and, where there is such an axis,
+/// absorption.
 Panel panel_of(const std::vector<std::unique_ptr<Source>>& sources, const std::vector<std::string>& names,
-               TableKind kind, double sigma, double g) {
+               TableKind kind, double sigma, double g, double absorption) {
     constexpr const char* colours[] = {"#1f4e9c", "#c2571a", "#2c8a4b"};
     const std::vector<Axis> axes = sources[0]->parameter_axes(kind);
     const bool azimuthal = kind == TableKind::azimuthal;
     Parameters at;
     at.sigma = nearest(axes, "sigma", sigma), at.g = nearest(axes, "g", g);
+    at.absorption = nearest(axes, "absorption", absorption);
     Panel panel;
     panel.title = fmt::format("{}, σ {:.3g}, g {:.2g}", name_of(kind), at.sigma, at.g);
+    if (azimuthal && sources[0]->absorbs()) panel.title += fmt::format(", σa {:.2g}", at.absorption);
     panel.x_label = azimuthal ? "φ [degrees]" : "θr [degrees]";
     const double positions[] = {0, azimuthal ? 0.6 : pi / 6, azimuthal ? 0.95 : pi / 3};
     for (std::size_t p = 0; p < 3; ++p) {
@@ -51,7 +54,7 @@ Panel panel_of(const std::vector<std::unique_ptr<Source>>& sources, const std::v
         else
             at.theta_i = nearest(axes, "theta_i", positions[p]);
         for (std::size_t s = 0; s < sources.size(); ++s) {
-            if (!sources[s]->has(kind)) continue;
+            if (!sources[s]->has(kind) || (at.absorption != 0 && !sources[s]->absorbs())) continue;
             sources[s]->check(kind, at, names[s]);
             Curve curve;
             const std::size_t bins = sources[s]->bins(kind);
@@ -101,8 +104,11 @@ void run_plot(const PlotWords& words) {
     const double points[][2] = {{0.5, 0.3}, {2, 0.7}, {8, 0.9}};
     std::vector<Panel> panels;
     for (const TableKind kind : lobe_kinds)
-        for (const auto& point : points)
-            if (sources[0]->has(kind)) panels.push_back(panel_of(sources, words.files, kind, point[0], point[1]));
+        for (const double absorption : {0, 1})
+            for (const auto& point : points)
+                if (sources[0]->has(kind) &&
+                    (absorption == 0 || (kind == TableKind::azimuthal && sources[0]->absorbs())))
+                    panels.push_back(panel_of(sources, words.files, kind, point[0], point[1], absorption));
     const std::string picture = svg(title, panels, 3);
     if (extension == ".png")
         write_png(words.output, picture);

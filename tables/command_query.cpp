@@ -12,7 +12,7 @@ struct QueryWords {
     double theta_degrees = 0;
     std::size_t bins = 0;
     bool csv = false, json = false;
-    const CLI::Option *h = nullptr, *theta = nullptr;
+    const CLI::Option *h = nullptr, *theta = nullptr, *absorption = nullptr;
 };
 
 struct Column {
@@ -42,6 +42,7 @@ void run_query(const QueryWords& words) {
     const std::vector<TableKind> kinds =
         azimuthal ? std::vector<TableKind>{TableKind::azimuthal}
                   : std::vector<TableKind>{TableKind::longitudinal_back, TableKind::longitudinal_forward};
+    if (!azimuthal && *words.absorption) throw UsageError("query: --absorption needs --table azimuthal");
     for (const TableKind kind : kinds) source->check(kind, at, words.file);
     const std::size_t bins = words.bins > 0 ? words.bins : source->bins(kinds[0]);
     std::vector<Column> columns = {{exit_name(kinds[0]), exit_axis(exit_name(kinds[0]), bins).values}};
@@ -50,6 +51,7 @@ void run_query(const QueryWords& words) {
         json["h"] = words.at.h;
     else
         json["theta_i"] = words.theta_degrees * pi / 180;
+    if (azimuthal && source->absorbs()) json["absorption"] = at.absorption;
     for (const TableKind kind : kinds) {
         std::vector<double> lobe = source->lobe(kind, at, bins);
         if (mirrored) std::reverse(lobe.begin(), lobe.end());
@@ -87,8 +89,8 @@ void add_query(CLI::App& app, Action& action) {
             command.add_option("--g", words.at.g, "mean cosine")->required();
             words.h = command.add_option("--h", words.at.h, "offset in [-1, 1] (azimuthal)");
             words.theta = command.add_option("--theta", words.theta_degrees, "inclination in degrees (longitudinal)");
-            command.add_option("--absorption", words.at.absorption,
-                               "optical radius of absorption, where there is such an axis");
+            words.absorption = command.add_option("--absorption", words.at.absorption,
+                                                  "optical radius of absorption, where there is such an axis");
             command.add_option("--bins", words.bins, "exit directions to print (default: the table's own)")
                 ->check(CLI::Range(2, 100000));
             auto* csv = command.add_flag("--csv", words.csv, "comma-separated with one header line");

@@ -4,6 +4,7 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
+#include "tables/pack_degeneracy.hpp"
 #include "tables/program.hpp"
 #include "tables/source.hpp"
 
@@ -28,6 +29,8 @@ void add_commands(CLI::App& app, Action& action);
 /// The rows of a LobeError that compress, diff and verify print alike.
 nlohmann::ordered_json to_json(const std::vector<LobeError>& errors);
 void print(const std::vector<LobeError>& errors);
+nlohmann::ordered_json to_json(const PackDegeneracy& degeneracy);
+void print(const PackDegeneracy& degeneracy);
 
 /// A subcommand whose words live in T: declares it, and runs `run(words)` when it is typed.
 template <class T, class Declare, class Run>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "tables/error.hpp"
@@ -12,8 +13,8 @@ namespace medulla::tables {
 namespace {
 
 constexpr int rank_step = static_cast<int>(rank_multiple), greatest_rank = static_cast<int>(max_rank);
-/// Of the slab's energies: three small axes, more rank is only rounding.
-constexpr int energy_rank = 24;
+/// Of the energies: more rank is only rounding. The slab's have three small axes, the disc's with absorption four.
+int energy_rank(const Part& part) { return part.kind == TableKind::survival ? 48 : 24; }
 /// Of the solves that say how hard each part is.
 constexpr int pilot_rank = 32;
 /// Room kept for the provenance text when a pack must fit into a number of bytes.
@@ -171,7 +172,7 @@ double kind_error(const Solves& solves, std::size_t first, std::size_t last) {
 void solve_to(Solves& solves, double error, const CompressOptions& options) {
     for (const auto& [first, last] : kinds_of(solves)) {
         if (!solves[first].part->lobes()) {
-            solves[first].rank = energy_rank;
+            solves[first].rank = energy_rank(*solves[first].part);
             continue;
         }
         double spline = 0;
@@ -257,7 +258,8 @@ TableReport report_of(const Solves& solves, std::size_t first, std::size_t last,
     report.fit_error = kind_error(solves, first, last);
     double spline = 0;
     for (std::size_t i = first; i < last; ++i) {
-        report.parts.push_back({solves[i].part->mirror, solves[i].result.report, solves[i].rank});
+        report.parts.push_back(
+            {solves[i].part->mirror, solves[i].result.report, solves[i].rank, solves[i].part->share});
         spline += solves[i].part->exit_error * solves[i].part->exit_error;
     }
     report.exit_error = std::sqrt(spline);
@@ -275,12 +277,13 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 
 CompressResult compress(const Tables& tables, const CompressOptions& options, const std::string& input) {
     const auto start = std::chrono::steady_clock::now();
+    const std::clock_t cpu_start = std::clock();
     const std::vector<Part> parts = (options.solver == tensor::Solver::nonnegative ? whole_lobes_of : parts_of)(
         tables, options.phi_spans, options.theta_spans);
     Solves solves;
     const bool searched = options.max_error || options.max_bytes;
     const int rank = searched ? pilot_rank : options.rank;
-    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank});
+    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank(part)});
     if (searched) run(solves, options, true);
     if (options.max_error) solve_to(solves, *options.max_error, options);
     if (options.max_bytes) share_bytes(solves, *options.max_bytes);
@@ -293,6 +296,8 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
     }
     result.pack = write_pack(packed, provenance(tables, options, input, result.tables));
     result.solve_seconds = seconds_since(start);
+    result.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
+    result.degeneracy = degeneracy_of(open_pack(result.pack.data(), result.pack.size()).pack);
     result.errors = compare(*table_source(tables), *pack_source(result.pack, "the new pack"));
     result.seconds = seconds_since(start);
     return result;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tables/pack_degeneracy.hpp"
 #include "tables/source.hpp"
 #include "tables/spline.hpp"
 #include "tensor/cp.hpp"
@@ -26,6 +27,7 @@ struct PartReport {
     Mirror mirror;  ///< none: the slab's energies, which have no exit direction, and whole non-negative lobes
     tensor::CpReport solve;
     int rank = 0;
+    double share = 1;  ///< norm of the part over that of its kind's lobes
 };
 
 struct TableReport {
@@ -40,8 +42,10 @@ struct CompressResult {
     std::vector<unsigned char> pack;
     std::vector<TableReport> tables;
     std::vector<LobeError> errors;  ///< of the finished pack against the tables
+    PackDegeneracy degeneracy;      ///< of the finished pack's components
     double solve_seconds = 0;       ///< tables in memory to pack
-    double seconds = 0;             ///< that and the errors; without reading or writing files
+    double cpu_seconds = 0;         ///< processor time of those, all threads of the program
+    double seconds = 0;             ///< solve_seconds and the errors; without reading or writing files
 };
 
 /// Compresses every lobe kind of `tables`. `input` is named in the pack's provenance. Throws Error where max_error or

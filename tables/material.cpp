@@ -1,10 +1,10 @@
 #include "tables/material.hpp"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "tables/error.hpp"
 #include "tables/file.hpp"
+#include "tables/json_text.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -19,24 +19,8 @@ std::string read_text(const std::string& path) {
     return {bytes.begin(), bytes.end()};
 }
 
-json parse_json(const std::string& text, const std::string& path) {
-    // A hostile file could nest beyond the stack; materials need three levels.
-    int depth = 0;
-    const auto shallow = [&](int, json::parse_event_t event, json&) {
-        depth += event == json::parse_event_t::object_start || event == json::parse_event_t::array_start;
-        depth -= event == json::parse_event_t::object_end || event == json::parse_event_t::array_end;
-        if (depth > 8) throw Error("{}: expected at most 8 levels of JSON", path);
-        return true;
-    };
-    try {
-        return json::parse(text, shallow);
-    } catch (const json::exception& error) {
-        throw Error("{}: expected JSON: {}", path, error.what());
-    }
-}
-
 double number(const json& value, const std::string& field) {
-    if (!value.is_number()) throw Error("{}: expected a number, found {}", field, value.dump());
+    if (!value.is_number()) throw Error("{}: expected a number, found {}", field, value.dump().substr(0, 40));
     return value.get<double>();
 }
 
@@ -69,6 +53,12 @@ Material material_of(const json& entry, const std::string& where) {
             material.name = value.get<std::string>();
             continue;
         }
+        if (key == "fresnel") {
+            if (value != "bravais" && value != "exact")
+                throw Error("{}: expected \"bravais\" or \"exact\", found {}", field, value.dump());
+            fur.fresnel = value == "exact" ? Fresnel::exact : Fresnel::bravais;
+            continue;
+        }
         if (key == "sigma_ca") {
             material.grey = !value.is_array();
             if (value.is_array() && value.size() != 3)
@@ -83,7 +73,7 @@ Material material_of(const json& entry, const std::string& where) {
         if (!known)
             throw Error(
                 "{}: no such field; expected name, preset, eta, kappa, alpha, beta_m, beta_n, layers, sigma_ca, "
-                "sigma_ms, sigma_ma or g",
+                "sigma_ms, sigma_ma, g or fresnel",
                 field);
     }
     if (const FurStatus status = check(fur); status != FurStatus::ok) throw Error("{}: {}", where, describe(status));
@@ -104,11 +94,11 @@ Material read_material(const std::string& path) { return parse_material(read_tex
 std::vector<Material> read_scene(const std::string& path) { return parse_scene(read_text(path), path); }
 
 Material parse_material(const std::string& text, const std::string& where) {
-    return material_of(parse_json(text, where), where + ": ");
+    return material_of(parse_json(text.data(), text.data() + text.size(), where), where + ": ");
 }
 
 std::vector<Material> parse_scene(const std::string& text, const std::string& path) {
-    const json scene = parse_json(text, path);
+    const json scene = parse_json(text.data(), text.data() + text.size(), path);
     if (!scene.is_object() || !scene.contains("materials") || !scene["materials"].is_array() ||
         scene["materials"].empty())
         throw Error("{}: /materials: expected a list of materials", path);

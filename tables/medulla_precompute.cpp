@@ -3,20 +3,23 @@
 
 #include <nlohmann/json.hpp>
 
+#include "tables/forecast.hpp"
 #include "tables/precompute.hpp"
 #include "tables/program.hpp"
+#include "tables/scene.hpp"
 
 namespace {
 
 using namespace medulla::tables;
 
 struct Words {
-    std::string output = "tables.h5", table = "both", sigma, g, h, theta, method = "auto", progress = "auto",
-                compression = "zstd", shard = "auto";
+    std::string output = "tables.h5", table = "both", sigma, g, h, theta, absorption, method = "auto",
+                progress = "auto", compression = "zstd", shard = "auto", scene;
     std::size_t bins = 720;
     std::uint64_t paths = 100000, seed = 1;
+    std::optional<double> target_error, time_budget;
     int threads = 0;
-    bool json = false, resume = false;
+    bool json = false, resume = false, dry_run = false;
 };
 
 /// The axis of a range given in words; the default one where there are none.
@@ -36,8 +39,15 @@ Request request_of(const Words& words) {
         request.g = axis_of(words.g, "--g-range", request.g);
         request.h = axis_of(words.h, "--h-range", request.h);
         request.theta_i = axis_of(words.theta, "--theta-range", request.theta_i, medulla::pi / 180);
+        if (!words.absorption.empty())
+            request.absorption = graded_axis("absorption", parse_range(words.absorption, "--absorption-range", 8));
         request.bins = words.bins;
         request.paths = words.paths;
+        if (words.target_error && *words.target_error == 0)
+            throw Error("--target-error: expected more than 0, found 0");
+        if (words.time_budget && *words.time_budget == 0) throw Error("--time-budget: expected more than 0, found 0");
+        request.target_error = words.target_error.value_or(0);
+        request.time_budget = words.time_budget.value_or(0);
         request.seed = words.seed;
         request.threads = words.threads;
         request.method = method_of(words.method);
@@ -81,6 +91,49 @@ Job job_of(const Words& words) {
     return job;
 }
 
+/// The slices of a job, or of a worker's share.
+std::vector<SliceId> slices_of_job(const Job& job) {
+    const std::vector<SliceId> all = slices_of(plan_of(job.request));
+    return job.shard ? share_of(job.request, all, *job.shard) : all;
+}
+
+double total_cost(const Job& job) {
+    double cost = 0;
+    for (const SliceId& id : slices_of_job(job)) cost += static_cast<double>(expected_cost(job.request, id));
+    return cost;
+}
+
+/// --dry-run: what would be simulated, and how long it will take. `share`: of the job without --scene.
+void print_forecast(const Job& job, double share, bool as_json) {
+    const std::vector<SliceId> slices = slices_of_job(job);
+    const Tables plan = plan_of(job.request);
+    const Forecast expected = forecast(job.request, slices, 2);
+    nlohmann::ordered_json json = {{"slices", expected.slices},
+                                   {"cells", expected.cells},
+                                   {"seconds", expected.seconds},
+                                   {"core_seconds", expected.core_seconds},
+                                   {"measured_slices", expected.measured},
+                                   {"share_of_whole", share}};
+    for (const Table* table : plan.present()) {
+        if (!as_json) fmt::print("{}: {} cells x {} bins\n", table->name, table->cells(), table->bins());
+        for (std::size_t k = 0; k + 1 < table->axes.size(); ++k) {
+            const Axis& axis = table->axes[k];
+            json["tables"][table->name][axis.name] = axis.values;
+            if (!as_json)
+                fmt::print("    {:<10} {:>5} nodes, {:.6g} .. {:.6g} [{}]\n", axis.name, axis.size(),
+                           axis.values.front(), axis.values.back(), axis_rule(axis.name).unit);
+        }
+    }
+    if (as_json) {
+        fmt::print("{}\n", json.dump());
+        return;
+    }
+    if (share < 1) fmt::print("{:.2g} % of the cost of all nodes\n", 100 * share);
+    fmt::print("{} slices, {} cells: about {} ({} of one core, as {} of the slices took)\n", expected.slices,
+               expected.cells, duration_text(expected.seconds), duration_text(expected.core_seconds),
+               expected.measured);
+}
+
 /// A worker's last words: what it did, and what is to be done when all have.
 void print_share(const Job& job, const JobReport& report, double seconds, bool as_json) {
     if (as_json) {
@@ -96,7 +149,21 @@ void print_share(const Job& job, const JobReport& report, double seconds, bool a
 }
 
 void run(const Words& words) {
-    const Job job = job_of(words);
+    Job job = job_of(words);
+    double share = 1;
+    if (!words.scene.empty()) {
+        const double whole = total_cost(job);
+        std::vector<std::string> notes;
+        try {
+            job.request = restrict_to(job.request, read_scene(words.scene), notes);
+        } catch (const Error& error) {
+            const std::string what = error.what();
+            throw Error("{}{}", what.rfind(words.scene, 0) == 0 ? "" : words.scene + ": ", what);
+        }
+        for (const std::string& note : notes) fmt::print(stderr, "{}: {}\n", words.scene, note);
+        share = total_cost(job) / whole;
+    }
+    if (words.dry_run) return print_forecast(job, share, words.json);
     const auto start = std::chrono::steady_clock::now();
     const JobReport report = run_job(job);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -107,11 +174,17 @@ void run(const Words& words) {
                                    {"sha256", hex(contents_hash(report.tables))}};
     for (const Table* table : report.tables.present()) {
         double worst = 0;
-        for (const double e : table->standard_error) worst = std::max(worst, e);
+        std::size_t above = 0;  // cells that did not reach --target-error
+        for (const double e : table->standard_error) worst = std::max(worst, e), above += e > job.request.target_error;
+        if (job.request.target_error == 0) above = 0;
         json["tables"][table->name] = {{"cells", table->cells()},
                                        {"bins", table->bins()},
                                        {"method", table->method},
                                        {"worst_standard_error", worst}};
+        if (job.request.target_error > 0) json["tables"][table->name]["cells_above_target"] = above;
+        if (!words.json && above > 0)
+            fmt::print("{}: {} of {} cells did not reach {:g}\n", table->name, above, table->cells(),
+                       job.request.target_error);
         if (!words.json)
             fmt::print("{}: {} cells x {} bins, {}, worst relative standard error of a lobe {:.2e}\n", table->name,
                        table->cells(), table->bins(), table->method, worst);
@@ -135,11 +208,22 @@ void declare(CLI::App& app, Words& words) {
     app.add_option("--h-range", words.h, "offsets LO:HI[:N], nodes denser towards HI (default 0:1:16)");
     app.add_option("--theta-range", words.theta,
                    "inclinations in degrees LO:HI[:N], nodes denser towards HI (default 0:90:16)");
+    app.add_option("--absorption-range", words.absorption,
+                   "optical radii of absorption LO:HI[:N], nodes denser towards LO: a fifth axis of C^N, from the same "
+                   "paths (default: none; N 8)");
+    app.add_option("--scene", words.scene, "scene file (JSON): only the nodes that its materials can ask for");
+    app.add_flag("--dry-run", words.dry_run, "say what would be simulated and how long it will take; write nothing");
     app.add_option("--bins", words.bins, "exit directions over the full circle, even")->capture_default_str();
     app.add_option("--method", words.method, "how each cell is solved")
         ->check(CLI::IsMember({"auto", "analog", "mc", "deterministic"}))
         ->capture_default_str();
-    app.add_option("--paths", words.paths, "paths per cell of the random methods")->capture_default_str();
+    CLI::Option_group* done = app.add_option_group("done", "When a cell is done");
+    done->add_option("--paths", words.paths, "paths per cell of the random methods")->capture_default_str();
+    done->add_option("--target-error", words.target_error,
+                     "relative L2 standard error below which each cell is solved, 1e-6 to 0.1");
+    done->add_option("--time-budget", words.time_budget,
+                     "seconds for the job, spent where error falls most (results then depend on the machine's speed)");
+    done->require_option(0, 1);
     app.add_option("--seed", words.seed, "of the random methods")->capture_default_str();
     app.add_option("--threads", words.threads, "0: all")->capture_default_str();
     app.add_flag("--resume", words.resume, "go on from the slices kept in OUTPUT.shards/");

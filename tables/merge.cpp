@@ -63,6 +63,7 @@ void extend(std::optional<Table>& merged, const Table& other, const std::string&
         merged.emplace();
         merged->name = other.name, merged->axes = other.axes, merged->method = other.method;
         merged->seed = other.seed, merged->paths = other.paths;
+        merged->target_error = other.target_error, merged->time_budget = other.time_budget;
         return;
     }
     const auto differ = [&](const char* what, const std::string& expected, const std::string& found) {
@@ -73,6 +74,8 @@ void extend(std::optional<Table>& merged, const Table& other, const std::string&
     differ("method", merged->method, other.method);
     differ("seed", std::to_string(merged->seed), std::to_string(other.seed));
     differ("paths", std::to_string(merged->paths), std::to_string(other.paths));
+    differ("target_error", fmt::format("{:g}", merged->target_error), fmt::format("{:g}", other.target_error));
+    differ("time_budget", fmt::format("{:g}", merged->time_budget), fmt::format("{:g}", other.time_budget));
     const auto names = [](const Table& table) {
         std::string text;
         for (const Axis& axis : table.axes) text += (text.empty() ? "" : ", ") + axis.name;
@@ -83,7 +86,7 @@ void extend(std::optional<Table>& merged, const Table& other, const std::string&
         std::vector<double>& into = merged->axes[k].values;
         const std::vector<double>& from = other.axes[k].values;
         if (into == from) continue;
-        if (merged->axes[k].name != "sigma" && merged->axes[k].name != "g")
+        if (k + 1 == merged->axes.size())
             throw Error("{}: /{}/{}: expected the values of the parts before, found others", path, other.name,
                         other.axes[k].name);
         std::vector<double> both;
@@ -97,14 +100,33 @@ std::uint32_t index_of(const Axis& axis, double value) {
                                       axis.values.begin());
 }
 
-template <class T>
-bool same_bytes(const std::vector<T>& a, const std::vector<T>& b) {
-    return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0;
+/// The cells of `to` that the cells of one slice of `from` are.
+std::vector<std::size_t> places(const Table& from, const SliceId& id, const Table& to) {
+    const std::size_t cells = slice_cells(from), first = (id.sigma * from.axis("g").size() + id.g) * cells;
+    std::vector<std::size_t> list(cells);
+    for (std::size_t c = 0; c < cells; ++c) {
+        const std::vector<std::size_t> index = from.position(first + c);
+        for (std::size_t k = 0; k < index.size(); ++k)
+            list[c] = list[c] * to.axes[k].size() + index_of(to.axes[k], from.axes[k].values[index[k]]);
+    }
+    return list;
 }
 
-bool same(const Slice& a, const Slice& b) {
-    return same_bytes(a.lobe, b.lobe) && same_bytes(a.energy, b.energy) && same_bytes(a.energy_error, b.energy_error) &&
-           same_bytes(a.standard_error, b.standard_error) && same_bytes(a.mean_length, b.mean_length);
+void put_cell(const Slice& slice, std::size_t c, Table& table, std::size_t cell) {
+    std::copy_n(slice.lobe.begin() + c * slice.bins, slice.bins, table.lobe.begin() + cell * slice.bins);
+    const auto from = cell_arrays(slice);
+    const auto to = cell_arrays(table);
+    for (std::size_t a = 0; a < from.size(); ++a) (*to[a])[cell] = (*from[a])[c];
+}
+
+/// Whether a cell holds the same bytes.
+bool same_cell(const Slice& slice, std::size_t c, const Table& table, std::size_t cell) {
+    const auto ours = cell_arrays(slice);
+    const auto theirs = cell_arrays(table);
+    bool same = std::memcmp(slice.lobe.data() + c * slice.bins, table.lobe_of(cell), slice.bins * sizeof(float)) == 0;
+    for (std::size_t a = 0; a < ours.size(); ++a)
+        same = same && std::memcmp(&(*ours[a])[c], &(*theirs[a])[cell], sizeof(double)) == 0;
+    return same;
 }
 
 }  // namespace
@@ -120,28 +142,37 @@ Tables merge(const std::vector<std::string>& paths) {
         if (part->tables.azimuthal) extend(merged.azimuthal, *part->tables.azimuthal, part->path);
         if (part->tables.longitudinal) extend(merged.longitudinal, *part->tables.longitudinal, part->path);
     }
-    for (auto* table : {&merged.azimuthal, &merged.longitudinal})
-        if (*table) (*table)->allocate();
-    const std::vector<SliceId> all = slices_of(merged);
-    const auto key = [](const SliceId& id) { return std::tuple(id.table, id.sigma, id.g); };
-    std::map<std::tuple<TableName, std::uint32_t, std::uint32_t>, const Part*> holder;
+    std::map<TableName, std::vector<const Part*>> holders;  // of each cell
+    for (const TableName name : {TableName::azimuthal, TableName::longitudinal}) {
+        auto& table = name == TableName::azimuthal ? merged.azimuthal : merged.longitudinal;
+        if (!table) continue;
+        table->allocate();
+        holders[name].resize(table->cells());
+    }
     for (const auto& part : parts)
         for (const SliceId& id : part->held()) {
-            const Table &from = table_of(part->tables, id.table), &to = table_of(merged, id.table);
-            const SliceId place = {id.table, index_of(to.axis("sigma"), from.axis("sigma").values[id.sigma]),
-                                   index_of(to.axis("g"), from.axis("g").values[id.g])};
+            Table& to = table_of(merged, id.table);
+            const std::vector<std::size_t> cells = places(table_of(part->tables, id.table), id, to);
             const Slice slice = part->slice(id);
-            const auto [entry, fresh] = holder.emplace(key(place), part.get());
-            if (!fresh && !same(slice, take_slice(merged, place)))
-                throw Error("{} and {} hold different slices of {}", entry->second->path, part->path,
-                            describe(merged, place));
-            if (fresh) put_slice(merged, place, slice);
+            for (std::size_t c = 0; c < cells.size(); ++c) {
+                const Part*& holder = holders[id.table][cells[c]];
+                if (holder && !same_cell(slice, c, to, cells[c]))
+                    throw Error("{} and {} hold different values of {} {}", holder->path, part->path, to.name,
+                                to.describe(cells[c]));
+                if (holder) continue;
+                holder = part.get();
+                put_cell(slice, c, to, cells[c]);
+            }
         }
-    if (holder.size() == all.size()) return merged;
-    const auto missing =
-        std::find_if(all.begin(), all.end(), [&](const SliceId& id) { return !holder.count(key(id)); });
-    throw Error("{}: {} of {} slices are missing, the first is {}", parts.front()->path, all.size() - holder.size(),
-                all.size(), describe(merged, *missing));
+    for (const auto& [name, held] : holders) {
+        const auto missing = std::count(held.begin(), held.end(), nullptr);
+        if (missing == 0) continue;
+        const auto first = std::find(held.begin(), held.end(), nullptr) - held.begin();
+        const Table& table = table_of(merged, name);
+        throw Error("{}: {} of {} cells of {} are missing, the first is {}", parts.front()->path, missing, held.size(),
+                    table.name, table.describe(static_cast<std::size_t>(first)));
+    }
+    return merged;
 }
 
 }  // namespace medulla::tables

@@ -9,9 +9,9 @@
 namespace medulla::tables {
 
 /// Merges shard folders (named themselves, or by the output they belong to) and tables files. All parts must agree in
-/// program, method, seed, paths and every axis but sigma and g; the result has the union of their sigma and g nodes,
-/// and equals what one process would have made. Throws Error where parts disagree, where two hold different slices of
-/// one (sigma, g), and where one is missing.
+/// program, method, when a cell is done, and the exit axis; the result has the union of their other axes' nodes, and
+/// equals what one process would have made. Throws Error where parts disagree, where two hold different values of one
+/// cell, and where one is missing.
 Tables merge(const std::vector<std::string>& parts);
 
 }  // namespace medulla::tables

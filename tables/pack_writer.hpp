@@ -22,12 +22,12 @@ struct PackedAxis {
 /// first `even_rank` components are their own mirror image, the others change sign.
 struct PackedTable {
     TableKind kind;
-    std::vector<PackedAxis> axes;  ///< the last one is the exit direction, but for back_fraction
+    std::vector<PackedAxis> axes;  ///< the last one of a lobe is the exit direction
     Eigen::VectorXd weights;
     int even_rank;
     float low, high;  ///< least and greatest value of the table it was made from
 
-    bool has_exit() const { return kind != TableKind::back_fraction; }
+    bool has_exit() const { return is_lobe(kind); }
 };
 
 /// Lays the tables out as a pack. Columns are stored as 12-bit numbers with one scale per component (relative

@@ -135,17 +135,24 @@ Part energy_part(const Table& table) {
         values[i] = total > 0 ? back / total : 0.5;
     }
     if (sigma[0] == 0 && sigma.size() >= 4)
-        for (std::size_t j = 0; j < row; ++j) {
-            double value = 0;
-            for (std::size_t a = 1; a <= 3; ++a) {
-                double lagrange = 1;
-                for (std::size_t b = 1; b <= 3; ++b)
-                    if (b != a) lagrange *= -sigma[b] / (sigma[a] - sigma[b]);
-                value += lagrange * values[a * row + j];
-            }
-            values[j] = value;
-        }
+        for (std::size_t j = 0; j < row; ++j)
+            values[j] = extrapolate({sigma[1], sigma[2], sigma[3]},
+                                    {values[row + j], values[2 * row + j], values[3 * row + j]}, 0);
     return part;
+}
+
+/// What absorption leaves of the disc's energies, as lengths: exp(-a length) is 1 at a = 0 and below it elsewhere.
+Part survival_part(const Table& table) {
+    Part part;
+    part.kind = TableKind::survival, part.mirror = Mirror::even;
+    add_parameters(table, part);
+    part.values.values = survival_lengths(table);
+    return part;
+}
+
+void add_energies(const Tables& tables, std::vector<Part>& parts) {
+    if (tables.longitudinal) parts.push_back(energy_part(*tables.longitudinal));
+    if (tables.azimuthal && tables.azimuthal->has_axis("absorption")) parts.push_back(survival_part(*tables.azimuthal));
 }
 
 }  // namespace
@@ -211,7 +218,7 @@ std::vector<Part> parts_of(const Tables& tables, std::size_t phi_spans, std::siz
                       if (mirror == Mirror::even || part.share > 1e-6) parts.push_back(std::move(part));
                   }
               });
-    if (tables.longitudinal) parts.push_back(energy_part(*tables.longitudinal));
+    add_energies(tables, parts);
     return parts;
 }
 
@@ -221,7 +228,7 @@ std::vector<Part> whole_lobes_of(const Tables& tables, std::size_t phi_spans, st
               [&](const Table& table, TableKind kind, const auto& lobes, double whole, std::size_t spans) {
                   parts.push_back(whole_part(table, kind, lobes, whole, spans));
               });
-    if (tables.longitudinal) parts.push_back(energy_part(*tables.longitudinal));
+    add_energies(tables, parts);
     return parts;
 }
 

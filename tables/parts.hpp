@@ -27,7 +27,7 @@ struct Part {
     /// The same for the exit axis, even before odd: one for a part, both for whole lobes, none for the energies.
     std::vector<Eigen::MatrixXd> exit_maps;
 
-    bool lobes() const { return kind != TableKind::back_fraction; }
+    bool lobes() const { return is_lobe(kind); }
     /// Components of the pack for each component of the model.
     int copies() const { return static_cast<int>(std::max<std::size_t>(1, exit_maps.size())); }
     /// Bytes that one component of the model takes in a pack (12-bit rows, a scale, an integral).
@@ -38,8 +38,8 @@ struct Part {
 /// circle: dense where lobes are narrow (docs/formats.md).
 std::vector<double> exit_breakpoints(TableKind kind, std::size_t bins, std::size_t spans);
 
-/// The parts of every kind of lobe in the tables, and of the slab's energies: even before odd, kinds in the order of a
-/// pack. A part that is nothing but float rounding of its lobes is left out.
+/// The parts of every kind of lobe in the tables, of the slab's energies, and of what absorption leaves of the disc's:
+/// even before odd, kinds in the order of a pack. A part that is nothing but float rounding of its lobes is left out.
 /// @param spans of the exit spline over the full axis, see CompressOptions
 std::vector<Part> parts_of(const Tables& tables, std::size_t phi_spans, std::size_t theta_spans);
 

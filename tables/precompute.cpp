@@ -1,11 +1,15 @@
 #include "tables/precompute.hpp"
 
+#include <omp.h>
 #include <signal.h>
 #include <unistd.h>
 
 #include <filesystem>
+#include <mutex>
 
+#include "tables/budget.hpp"
 #include "tables/error.hpp"
+#include "tables/parallel.hpp"
 #include "tables/program.hpp"
 
 namespace medulla::tables {
@@ -51,25 +55,46 @@ std::optional<Tables> finished(const Job& job, const Tables& plan) {
     return tables;
 }
 
-/// Solves what `slices` misses and keeps it.
+Refinable refinable(const ShardFolder& folder, const SliceId& id) {
+    std::string why;
+    const std::optional<Slice> slice = folder.read(id, why);
+    if (!slice) throw Error("{}: damaged: {}", folder.file_of(id), why);
+    return {id, slice->standard_error, 0};
+}
+
+/// Solves what `slices` misses and keeps it; with a time budget coarsely first, then where error falls most.
 void solve(const Job& job, const SliceSolver& solver, const ShardFolder& folder, const std::vector<SliceId>& slices,
            const std::vector<bool>& kept) {
+    const double start = omp_get_wtime(), budget = job.request.time_budget;
     std::vector<SliceId> missing;
+    std::vector<Refinable> coarse;
     std::size_t cells = 0, done = 0;
     for (std::size_t i = 0; i < slices.size(); ++i) {
         const std::size_t count = slice_cells(table_of(solver.plan(), slices[i].table));
         cells += count;
-        if (kept[i])
-            done += count;
-        else
+        if (!kept[i]) {
             missing.push_back(slices[i]);
+            continue;
+        }
+        done += count;
+        if (budget > 0) coarse.push_back(refinable(folder, slices[i]));
     }
-    Progress progress(job.progress, "precompute", cells, done);
-    in_parallel(missing.size(), job.request.threads, stop, [&](std::size_t i) {
-        const Slice slice = solver.solve(missing[i]);
-        folder.write(missing[i], slice);
-        progress.add(slice.cells);
-    });
+    {
+        Progress progress(job.progress, "precompute", cells, done);
+        std::mutex mutex;
+        in_parallel(missing.size(), job.request.threads, stop, [&](std::size_t i) {
+            const double began = omp_get_wtime();
+            const Slice slice = budget > 0 ? solver.solve(missing[i], refinements[0]) : solver.solve(missing[i]);
+            folder.write(missing[i], slice);
+            progress.add(slice.cells);
+            if (budget == 0) return;
+            const std::lock_guard<std::mutex> lock(mutex);
+            coarse.push_back({missing[i], slice.standard_error, omp_get_wtime() - began});
+        });
+    }
+    if (budget == 0 || stop) return;
+    refine(solver, std::move(coarse), budget - (omp_get_wtime() - start), job.request.threads, stop,
+           [&](const SliceId& id, const Slice& slice) { folder.write(id, slice); });
 }
 
 std::size_t count_kept(const ShardFolder& folder, const std::vector<SliceId>& slices) {
@@ -101,6 +126,8 @@ Tables assemble(const ShardFolder& folder, const Tables& plan) {
 
 JobReport run_job(const Job& job) {
     const Interrupts interrupts;
+    if (std::filesystem::is_directory(job.output))
+        throw Error("{}: expected the name of a file, found a folder", job.output);
     const SliceSolver solver(job.request);
     const Tables& plan = solver.plan();
     ShardFolder folder(ShardFolder::beside(job.output), plan);

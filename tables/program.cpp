@@ -6,7 +6,10 @@
 namespace medulla::tables {
 
 int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& action) {
-    const auto complain = [&](const std::string& text) {
+    const auto complain = [&](std::string text) {
+        // One line, whatever stood in a file or a word that it quotes.
+        for (char& c : text)
+            if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
         fmt::print(stderr, "{}: {}\n", app.get_name(), text);
         std::fflush(stderr);
     };

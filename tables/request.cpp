@@ -39,12 +39,23 @@ void check_request(const Request& request) {
                                                         {&request.h, "--h-range"},
                                                         {&request.theta_i, "--theta-range"}};
     for (const auto& [axis, option] : axes) check_axis(*axis, option);
+    if (request.absorption.size() > 0) {
+        check_axis(request.absorption, "--absorption-range");
+        if (!request.azimuthal) throw Error("--absorption-range: expected the azimuthal table, which has that axis");
+        if (request.absorption.values.back() > 1000)
+            throw Error("--absorption-range: expected at most 1000, found {:g}", request.absorption.values.back());
+    }
     if (request.sigma.values.back() > 1000)
         throw Error("--sigma-range: expected at most 1000, found {:g}", request.sigma.values.back());
     if (request.bins < 8 || request.bins > 4096 || request.bins % 2 != 0)
         throw Error("--bins: expected an even number from 8 to 4096, found {}", request.bins);
     if (request.paths < 1 || request.paths > (std::uint64_t{1} << 40))
         throw Error("--paths: expected 1 to 2^40, found {}", request.paths);
+    if (request.target_error != 0 && !(request.target_error >= least_target && request.target_error <= greatest_target))
+        throw Error("--target-error: expected {:g} to {:g}, found {:g}", least_target, greatest_target,
+                    request.target_error);
+    if (!(request.time_budget >= 0 && request.time_budget <= 1e9))
+        throw Error("--time-budget: expected more than 0 and at most 1e9 seconds, found {:g}", request.time_budget);
     if (request.threads < 0 || request.threads > 1024)
         throw Error("--threads: expected 0 (all) to 1024, found {}", request.threads);
 }

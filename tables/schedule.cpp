@@ -24,11 +24,13 @@ std::uint64_t expected_cost(const Request& request, const SliceId& id) {
     const double sigma = request.sigma.values.at(id.sigma), g = request.g.values.at(id.g);
     const bool disc = id.table == TableName::azimuthal;
     const auto cells = static_cast<double>(disc ? request.h.size() : request.theta_i.size());
+    const auto absorptions = disc && request.absorption.size() > 0 ? static_cast<double>(request.absorption.size()) : 1;
     double cost = 0;
     if (request.method == Method::automatic || request.method == Method::deterministic) {
         // Fitted to scripts/measure-slices, sigma <= 16, g <= 0.95: within a factor 2 of each slice.
         const double peak = 1 / (1 - (g < 0 ? -g : g)), squared = peak * peak;
         cost += disc ? 2e4 + 1.8e3 * squared + 2 * sigma / (16 + sigma) * (2.2e5 + 5e3 * squared) : 1e4 + 250 * squared;
+        cost *= absorptions;  // each is a solve; paths answer for all of them at once
     }
     if (request.method == Method::analog || request.method == Method::mc)
         cost += cells * static_cast<double>(request.paths) * (0.2 + (disc ? 0.15 : 0.26) * sigma);

@@ -11,10 +11,10 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "tables/error.hpp"
 #include "tables/file.hpp"
+#include "tables/json_text.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -220,21 +220,26 @@ void ShardFolder::remove_if_empty() {
 
 namespace {
 
+/// A number as configuration_text writes it.
+double number_of(const nlohmann::ordered_json& json, const std::string& where) {
+    const std::string text = json.get<std::string>();
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    if (text.empty() || *end != '\0') throw Error("{}: expected a number, found '{}'", where, text);
+    return value;
+}
+
 Table planned_table(const nlohmann::ordered_json& json, const std::string& name, const std::string& where) {
     Table table;
     table.name = name;
     table.method = json.at("method").get<std::string>();
     table.seed = json.at("seed").get<std::uint64_t>();
     table.paths = json.at("paths").get<std::uint64_t>();
+    if (json.contains("target_error")) table.target_error = number_of(json["target_error"], where + "/target_error");
+    if (json.contains("time_budget")) table.time_budget = number_of(json["time_budget"], where + "/time_budget");
     for (const auto& [axis_name, values] : json.at("axes").items()) {
         Axis axis{axis_name, {}};
-        for (const auto& value : values) {
-            const std::string text = value.get<std::string>();
-            char* end = nullptr;
-            axis.values.push_back(std::strtod(text.c_str(), &end));
-            if (text.empty() || *end != '\0')
-                throw Error("{}/{}: expected a number, found '{}'", where, axis_name, text);
-        }
+        for (const auto& value : values) axis.values.push_back(number_of(value, where + "/" + axis_name));
         check_axis(axis, where);
         table.axes.push_back(std::move(axis));
     }
@@ -248,7 +253,8 @@ Tables read_configuration(const std::string& folder) {
     const std::vector<unsigned char> bytes = read_file(path, greatest_configuration);
     Tables plan;
     try {
-        const auto json = nlohmann::ordered_json::parse(bytes.begin(), bytes.end());
+        const auto* text = reinterpret_cast<const char*>(bytes.data());
+        const auto json = parse_json<nlohmann::ordered_json>(text, text + bytes.size(), path);
         plan.program = json.at("program").get<std::string>();
         const auto& tables = json.at("tables");
         if (tables.contains("azimuthal"))

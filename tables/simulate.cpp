@@ -1,17 +1,16 @@
 #include "tables/simulate.hpp"
 
-#include <omp.h>
-
 #include <cmath>
 #include <cstring>
-#include <exception>
 #include <mutex>
 #include <optional>
 
 #include "sim2d/analog.hpp"
 #include "sim2d/disc_deterministic.hpp"
 #include "sim2d/slab_deterministic.hpp"
+#include "sim2d/tracer.hpp"
 #include "tables/error.hpp"
+#include "tables/parallel.hpp"
 #include "tables/schedule.hpp"
 
 namespace medulla::tables {
@@ -45,42 +44,108 @@ void store(Slice& slice, std::size_t cell, const sim2d::Profile& profile) {
     slice.mean_length[cell] = profile.mean_length;
 }
 
-sim2d::TraceOptions trace_options(const Request& request, std::uint64_t cell) {
-    sim2d::TraceOptions options;
-    options.paths = request.paths;
-    options.seed = request.seed;
-    options.cell = cell;
-    return options;
+/// When a cell is done.
+struct Goal {
+    double target_error;  ///< relative L2 of a lobe; 0: after `paths`
+    std::uint64_t paths;  ///< of the random methods: exactly these, or with a target at most
+};
+
+Goal goal_of(const Request& request, double target_error) {
+    return {target_error, target_error > 0 ? std::uint64_t{1} << 35 : request.paths};
+}
+
+double worst_error(const sim2d::Profile& p) { return p.standard_error; }
+double worst_error(const sim2d::SlabProfile& p) { return std::max(p.back.standard_error, p.forward.standard_error); }
+/// One offset of the disc, at every absorption.
+double worst_error(const std::vector<sim2d::Profile>& cells) {
+    double e = 0;
+    for (const sim2d::Profile& p : cells) e = std::max(e, worst_error(p));
+    return e;
+}
+
+/// Analog paths from the first one on, until the error is at most the target: as many as counting says are missing.
+template <class Trace>
+auto count_until(const Goal& goal, Trace&& trace) {
+    for (std::uint64_t paths = goal.target_error > 0 ? 4096 : goal.paths;;) {
+        auto counted = trace(paths);
+        const double ratio = worst_error(counted) / goal.target_error;
+        if (goal.target_error == 0 || ratio <= 1 || paths >= goal.paths) return counted;
+        const double wanted = std::max(2.0, 1.05 * ratio * ratio) * static_cast<double>(paths);
+        paths = static_cast<std::uint64_t>(std::min(wanted, static_cast<double>(goal.paths)));
+    }
 }
 
 /// Relative L2 error that counting `paths` exits would leave on a lobe: sum p (1 - p) / (n sum p^2), p the bins'
 /// shares.
-double tracer_error(const sim2d::Profile& profile, std::uint64_t paths) {
+double counting_error(const sim2d::Profile& profile, std::uint64_t paths) {
     double sum = 0, squares = 0;
     for (const double value : profile.lobe) sum += value, squares += value * value;
     return std::sqrt((sum * sum / squares - 1) / static_cast<double>(paths));
 }
 
-/// Whether a cell is (also) traced: always by the random methods; by `auto` where counting paths would beat the
-/// noise-free solver's own estimate.
-bool wants_paths(const Request& request, const sim2d::Profile& solved) {
-    if (request.method != Method::automatic) return request.method != Method::deterministic;
-    return solved.standard_error > tracer_error(solved, request.paths);
+/// What the noise-free solver's error of a cell is held against before `auto` traces it.
+double error_of_paths(const sim2d::Profile& p, const Goal& goal) {
+    return goal.target_error > 0 ? goal.target_error : counting_error(p, goal.paths);
+}
+double error_of_paths(const sim2d::SlabProfile& p, const Goal& goal) {
+    return std::min(error_of_paths(p.back, goal), error_of_paths(p.forward, goal));
+}
+double error_of_paths(const std::vector<sim2d::Profile>& cells, const Goal& goal) {
+    double e = error_of_paths(cells.front(), goal);
+    for (const sim2d::Profile& p : cells) e = std::min(e, error_of_paths(p, goal));
+    return e;
 }
 
-double worst_error(const sim2d::SlabProfile& p) { return std::max(p.back.standard_error, p.forward.standard_error); }
+/// In denser discs than this `auto` walks from the start. Seconds to 1e-2 by walks and by grids: at sigma 30, g 0.9
+/// 0.25 and 0.07, at sigma 100 0.4 and 3, at sigma 100, g 0.99 5 and 140 (docs/accuracy.md).
+constexpr double greatest_grid_sigma = 50;
 
-bool solves(const Request& request) {
-    return request.method == Method::automatic || request.method == Method::deterministic;
+/// A slice's solvers: `exact(aim)` gives all cells without noise, `walk(i, goal)` one cell by the fast random solver,
+/// `count(i, paths)` one by the analog tracer.
+template <class Exact, class Walk, class Count>
+auto solve_cells(const Request& request, bool grids_reach, double target_error, std::size_t count_of_cells,
+                 Exact&& exact, Walk&& walk, Count&& count) {
+    using Profiles = decltype(exact(0.0));
+    const Goal goal = goal_of(request, target_error);
+    Profiles solved;
+    if (request.method == Method::analog) {
+        for (std::size_t i = 0; i < count_of_cells; ++i)
+            solved.push_back(count_until(goal, [&](std::uint64_t paths) { return count(i, paths); }));
+        return solved;
+    }
+    if (request.method == Method::mc || (request.method == Method::automatic && !grids_reach)) {
+        for (std::size_t i = 0; i < count_of_cells; ++i) solved.push_back(walk(i, goal).profile);
+        return solved;
+    }
+    const auto worst = [](const Profiles& cells) {
+        double e = 0;
+        for (const auto& p : cells) e = std::max(e, worst_error(p));
+        return e;
+    };
+    double aim = target_error > 0 ? target_error : sim2d::DiscOptions{}.target_error;
+    solved = exact(aim);
+    // Grids are chosen for an error; where their own estimate is above it they are chosen again, finer.
+    for (int again = 0; again < 4 && target_error > 0 && worst(solved) > target_error; ++again) {
+        aim = std::max(least_target, aim * std::min(0.7, target_error / worst(solved)));
+        Profiles finer = exact(aim);
+        if (!(worst(finer) < worst(solved))) break;
+        solved = std::move(finer);
+    }
+    if (request.method == Method::deterministic) return solved;
+    for (std::size_t i = 0; i < count_of_cells; ++i) {
+        if (worst_error(solved[i]) <= error_of_paths(solved[i], goal)) continue;
+        auto traced = walk(i, goal).profile;
+        if (worst_error(traced) < worst_error(solved[i])) solved[i] = std::move(traced);
+    }
+    return solved;
 }
 
-/// What depends on g alone: made once, by the first slice that needs it, and shared by every sigma.
-template <class Solver>
-class SolversByG {
+/// The slab's modes of each g: made once, by the first slice that needs them, and shared by every sigma.
+class SlabsByG {
   public:
-    explicit SolversByG(const std::vector<double>& g) : g_(g), made_(g.size()), solvers_(g.size()) {}
+    explicit SlabsByG(const std::vector<double>& g) : g_(g), made_(g.size()), solvers_(g.size()) {}
 
-    const Solver& at(std::size_t i) {
+    const sim2d::SlabSolver& at(std::size_t i) {
         std::call_once(made_[i], [&] { solvers_[i].emplace(g_[i]); });
         return *solvers_[i];
     }
@@ -88,7 +153,7 @@ class SolversByG {
   private:
     const std::vector<double>& g_;
     std::vector<std::once_flag> made_;
-    std::vector<std::optional<Solver>> solvers_;
+    std::vector<std::optional<sim2d::SlabSolver>> solvers_;
 };
 
 /// Program, version and compiler: another compiler may round otherwise.
@@ -97,7 +162,9 @@ std::string program_text() { return "medulla " MEDULLA_VERSION " (" MEDULLA_COMP
 void begin(Table& table, const Request& request) {
     table.method = name_of(request.method);
     table.seed = request.seed, table.paths = request.paths;
+    table.target_error = request.target_error, table.time_budget = request.time_budget;
     if (request.method == Method::deterministic) table.seed = table.paths = 0;
+    if (request.target_error > 0 || request.time_budget > 0) table.paths = 0;  // as many as it takes
 }
 
 }  // namespace
@@ -110,6 +177,8 @@ Tables plan_of(const Request& request) {
         plan.azimuthal.emplace();
         plan.azimuthal->name = "azimuthal";
         plan.azimuthal->axes = {request.sigma, request.g, request.h, exit_axis("phi", request.bins)};
+        if (request.absorption.size() > 0)
+            plan.azimuthal->axes.insert(plan.azimuthal->axes.begin() + 2, request.absorption);
         begin(*plan.azimuthal, request);
     }
     if (request.longitudinal) {
@@ -123,45 +192,74 @@ Tables plan_of(const Request& request) {
 }
 
 struct SliceSolver::State {
-    explicit State(const Request& wanted)
-        : request(wanted), plan(plan_of(request)), discs(request.g.values), slabs(request.g.values) {}
+    explicit State(const Request& wanted) : request(wanted), plan(plan_of(request)), slabs(request.g.values) {}
 
     const Request request;
     const Tables plan;
-    mutable SolversByG<sim2d::DiscSolver> discs;
-    mutable SolversByG<sim2d::SlabSolver> slabs;
+    mutable SlabsByG slabs;
 
-    Slice azimuthal(double sigma, std::size_t ig) const {
+    template <class Options>
+    Options options(std::uint64_t paths, std::uint64_t cell) const {
+        Options options;
+        options.paths = paths, options.seed = request.seed, options.cell = cell;
+        return options;
+    }
+    sim2d::TracerOptions options(const Goal& goal, std::uint64_t cell) const {
+        auto all = options<sim2d::TracerOptions>(goal.paths, cell);
+        all.target_error = goal.target_error;
+        return all;
+    }
+
+    Slice azimuthal(const SliceId& id, double target_error) const {
         const std::vector<double>& offsets = request.h.values;
-        const double g = request.g.values[ig];
-        Slice slice(offsets.size(), request.bins);
-        std::vector<sim2d::Profile> solved(offsets.size());
-        if (solves(request)) solved = discs.at(ig).solve(sigma, offsets, request.bins);
-        for (std::size_t i = 0; i < offsets.size(); ++i) {
-            const double h = offsets[i];
-            if (wants_paths(request, solved[i])) {
-                sim2d::Profile traced =
-                    sim2d::trace_disc(sigma, g, h, request.bins, trace_options(request, cell_key(0, {sigma, g, h})));
-                if (!solves(request) || traced.standard_error < solved[i].standard_error) solved[i] = std::move(traced);
-            }
-            store(slice, i, solved[i]);
-        }
+        const double sigma = request.sigma.values[id.sigma], g = request.g.values[id.g];
+        const std::size_t bins = request.bins;
+        // Without an axis of absorption: none.
+        const std::vector<double> absorption =
+            request.absorption.size() > 0 ? request.absorption.values : std::vector<double>{0.0};
+        const auto key = [&](std::size_t i) { return cell_key(0, {sigma, g, offsets[i]}); };
+        const std::vector<std::vector<sim2d::Profile>> solved = solve_cells(
+            request, sigma <= greatest_grid_sigma, target_error, offsets.size(),
+            [&](double aim) {
+                sim2d::DiscOptions grids;
+                grids.target_error = aim;
+                const sim2d::DiscSolver solver(g, grids);
+                std::vector<std::vector<sim2d::Profile>> cells(offsets.size());
+                for (const double a : absorption) {
+                    std::vector<sim2d::Profile> row = solver.solve(sigma, a, offsets, bins);
+                    for (std::size_t i = 0; i < offsets.size(); ++i) cells[i].push_back(std::move(row[i]));
+                }
+                return cells;
+            },
+            [&](std::size_t i, const Goal& goal) {
+                return sim2d::trace_expected_disc(sigma, g, offsets[i], absorption, bins, options(goal, key(i)));
+            },
+            [&](std::size_t i, std::uint64_t paths) {
+                return sim2d::trace_disc(sigma, g, offsets[i], absorption, bins,
+                                         options<sim2d::TraceOptions>(paths, key(i)));
+            });
+        Slice slice(absorption.size() * offsets.size(), bins);  // cells are [absorption][h]
+        for (std::size_t j = 0; j < absorption.size(); ++j)
+            for (std::size_t i = 0; i < offsets.size(); ++i) store(slice, j * offsets.size() + i, solved[i][j]);
         return slice;
     }
 
-    Slice longitudinal(double sigma, std::size_t ig) const {
+    Slice longitudinal(const SliceId& id, double target_error) const {
         const std::vector<double>& angles = request.theta_i.values;
-        const double g = request.g.values[ig];
-        Slice slice(2 * angles.size(), request.bins / 2);
-        std::vector<sim2d::SlabProfile> solved(angles.size());
-        if (solves(request)) solved = slabs.at(ig).solve(sigma, angles, slice.bins);
+        const double sigma = request.sigma.values[id.sigma], g = request.g.values[id.g];
+        const std::size_t bins = request.bins / 2;
+        const auto key = [&](std::size_t i) { return cell_key(1, {sigma, g, angles[i]}); };
+        const std::vector<sim2d::SlabProfile> solved = solve_cells(
+            request, true, target_error, angles.size(),
+            [&](double) { return slabs.at(id.g).solve(sigma, angles, bins); },
+            [&](std::size_t i, const Goal& goal) {
+                return sim2d::trace_expected_slab(sigma, g, angles[i], bins, options(goal, key(i)));
+            },
+            [&](std::size_t i, std::uint64_t paths) {
+                return sim2d::trace_slab(sigma, g, angles[i], bins, options<sim2d::TraceOptions>(paths, key(i)));
+            });
+        Slice slice(2 * angles.size(), bins);
         for (std::size_t i = 0; i < angles.size(); ++i) {
-            const double theta_i = angles[i];
-            if (wants_paths(request, solved[i].back) || wants_paths(request, solved[i].forward)) {
-                sim2d::SlabProfile traced = sim2d::trace_slab(sigma, g, theta_i, slice.bins,
-                                                              trace_options(request, cell_key(1, {sigma, g, theta_i})));
-                if (!solves(request) || worst_error(traced) < worst_error(solved[i])) solved[i] = std::move(traced);
-            }
             store(slice, 2 * i, solved[i].back);
             store(slice, 2 * i + 1, solved[i].forward);
         }
@@ -174,26 +272,11 @@ SliceSolver::~SliceSolver() = default;
 
 const Tables& SliceSolver::plan() const { return state_->plan; }
 
-Slice SliceSolver::solve(const SliceId& id) const {
-    const double sigma = state_->request.sigma.values.at(id.sigma);
-    return id.table == TableName::azimuthal ? state_->azimuthal(sigma, id.g) : state_->longitudinal(sigma, id.g);
-}
+Slice SliceSolver::solve(const SliceId& id) const { return solve(id, state_->request.target_error); }
 
-void in_parallel(std::size_t count, int threads, const std::atomic<bool>& stop,
-                 const std::function<void(std::size_t)>& job) {
-    std::exception_ptr error;
-    std::atomic<bool> failed{false};
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads > 0 ? threads : omp_get_max_threads())
-    for (std::size_t i = 0; i < count; ++i) {
-        if (failed || stop) continue;
-        try {
-            job(i);
-        } catch (...) {
-#pragma omp critical
-            if (!failed.exchange(true)) error = std::current_exception();
-        }
-    }
-    if (error) std::rethrow_exception(error);
+Slice SliceSolver::solve(const SliceId& id, double target_error) const {
+    return id.table == TableName::azimuthal ? state_->azimuthal(id, target_error)
+                                            : state_->longitudinal(id, target_error);
 }
 
 Tables simulate(const Request& request, ProgressMode mode) {

@@ -2,8 +2,6 @@
 // alone, not on other slices, threads or timing.
 #pragma once
 
-#include <atomic>
-#include <functional>
 #include <memory>
 
 #include "tables/progress.hpp"
@@ -25,16 +23,13 @@ class SliceSolver {
 
     const Tables& plan() const;
     Slice solve(const SliceId& id) const;
+    /// The same slice to another error; 0: by the request's paths, or to the noise-free solvers' usual error.
+    Slice solve(const SliceId& id, double target_error) const;
 
   private:
     struct State;
     std::unique_ptr<State> state_;
 };
-
-/// Runs `job(i)` for i = 0 .. count - 1 on `threads` threads (0: all), taking no more once `stop` is set or a job has
-/// thrown; rethrows the first error.
-void in_parallel(std::size_t count, int threads, const std::atomic<bool>& stop,
-                 const std::function<void(std::size_t)>& job);
 
 /// Simulates the tables of a request in memory.
 Tables simulate(const Request& request, ProgressMode progress);

@@ -11,12 +11,6 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "shards and hashes are 
 namespace medulla::tables {
 namespace {
 
-/// The arrays of a table or slice in the order of shards, hashes and copies.
-template <class T>
-auto cell_arrays(T& of) {
-    return std::array{&of.energy, &of.energy_error, &of.standard_error, &of.mean_length};
-}
-
 std::size_t place(const Table& table, const SliceId& id) {
     const std::size_t sigmas = table.axis("sigma").size(), gs = table.axis("g").size();
     if (id.sigma >= sigmas || id.g >= gs)
@@ -92,6 +86,9 @@ std::string configuration_text(const Tables& plan) {
         out["method"] = table->method;
         out["seed"] = table->seed;
         out["paths"] = table->paths;
+        // Only where they are set: a job without them keeps its text.
+        if (table->target_error > 0) out["target_error"] = fmt::format("{:a}", table->target_error);
+        if (table->time_budget > 0) out["time_budget"] = fmt::format("{:a}", table->time_budget);
         for (const Axis& axis : table->axes) {
             nlohmann::ordered_json values = nlohmann::ordered_json::array();
             for (const double x : axis.values) values.push_back(fmt::format("{:a}", x));

@@ -2,6 +2,7 @@
 // hashes: of a job's configuration (all that decides its bytes) and of a table's contents.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -31,6 +32,12 @@ struct Slice {
     Slice() = default;
     Slice(std::size_t cell_count, std::size_t bin_count);  ///< zeros
 };
+
+/// The arrays of a table or slice in the order of shards, hashes and copies.
+template <class T>
+auto cell_arrays(T& of) {
+    return std::array{&of.energy, &of.energy_error, &of.standard_error, &of.mean_length};
+}
 
 /// Cells of one slice of a table: everything behind sigma and g but the exit direction.
 std::size_t slice_cells(const Table& table);

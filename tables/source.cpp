@@ -1,14 +1,19 @@
 #include "tables/source.hpp"
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <mutex>
+#include <nlohmann/json.hpp>
 
 #include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
 #include "tables/error.hpp"
 #include "tables/file.hpp"
+#include "tables/parallel.hpp"
 #include "tables/spline.hpp"
 #include "tables/tables_file.hpp"
 
@@ -24,6 +29,7 @@ class TableSource : public Source {
         for (const Table* table : tables_.present())
             for (const Axis& axis : parameters_of(*table))
                 splines_.emplace(table->name + axis.name, Spline::through(quantity_of(axis.name), axis.values));
+        if (tables_.azimuthal) lengths_ = survival_lengths(*tables_.azimuthal);
     }
 
     bool has(TableKind kind) const override { return find(kind) != nullptr; }
@@ -50,6 +56,15 @@ class TableSource : public Source {
         return out;
     }
 
+    double noise(TableKind kind, const Parameters& at) const override {
+        const Table& table = *find(kind);
+        double noise = 0;
+        for_nodes(table, at, [&](std::size_t cell, double weight) {
+            noise += weight * table.standard_error[cell + (table.name == "longitudinal" ? side_of(kind) : 0)];
+        });
+        return std::abs(noise);
+    }
+
     double back_fraction(const Parameters& at) const override {
         const Table& table = *tables_.longitudinal;
         double back = 0, total = 0;
@@ -58,6 +73,13 @@ class TableSource : public Source {
             total += weight * (table.energy[cell] + table.energy[cell + 1]);
         });
         return total > 0 ? back / total : 0.5;  // nothing scattered: there is no share, and no energy to share
+    }
+
+    double survival(const Parameters& at) const override {
+        if (lengths_.empty()) return 1;
+        double length = 0;
+        for_nodes(*tables_.azimuthal, at, [&](std::size_t cell, double weight) { length += weight * lengths_[cell]; });
+        return std::exp(-at.absorption * length);
     }
 
   private:
@@ -74,32 +96,34 @@ class TableSource : public Source {
     /// Calls f(first cell of the node, weight) for every node with a weight; longitudinal nodes own two cells.
     template <class F>
     void for_nodes(const Table& table, const Parameters& at, F f) const {
-        const std::vector<Axis> axes = parameters_of(table);
-        std::vector<Eigen::RowVectorXd> weights;
-        for (const Axis& axis : axes) {
+        std::vector<std::pair<std::size_t, double>> nodes = {{0, 1.0}};  // of the axes so far, and their weights
+        for (const Axis& axis : parameters_of(table)) {
             Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(axis.size()));
             const double x = at[axis.name];
-            bool exact = false;
-            for (std::size_t i = 0; i < axis.size(); ++i)
-                if (axis.values[i] == x) row[static_cast<Eigen::Index>(i)] = 1, exact = true;
+            const auto found = std::find(axis.values.begin(), axis.values.end(), x);
             const Spline& spline = splines_.at(table.name + axis.name);
-            if (!exact) row = spline.basis(spline_coordinate(quantity_of(axis.name), x)) * spline.from_nodes();
-            weights.push_back(row);
+            if (found != axis.values.end())
+                row[found - axis.values.begin()] = 1;
+            else
+                row = spline.basis(spline_coordinate(quantity_of(axis.name), x)) * spline.from_nodes();
+            std::vector<std::pair<std::size_t, double>> next;
+            for (const auto& [node, weight] : nodes)
+                for (std::size_t i = 0; i < axis.size(); ++i) {
+                    const double here = weight * row[static_cast<Eigen::Index>(i)];
+                    if (here != 0) next.emplace_back(node * axis.size() + i, here);
+                }
+            nodes = std::move(next);
         }
-        const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
-        const std::size_t nodes = table.cells() / sides;
-        for (std::size_t node = 0; node < nodes; ++node) {
-            double weight = 1;
-            std::size_t rest = node;
-            for (std::size_t k = axes.size(); k-- > 0; rest /= axes[k].size())
-                weight *= weights[k][static_cast<Eigen::Index>(rest % axes[k].size())];
-            if (weight != 0) f(node * sides, weight);
-        }
+        for (const auto& [node, weight] : nodes) f(node * (table.name == "longitudinal" ? 2 : 1), weight);
     }
 
     Tables tables_;
     std::map<std::string, Spline> splines_;
+    std::vector<double> lengths_;  ///< survival_lengths
 };
+
+/// Of a pack: as many nodes on an axis as a tables file may have, and lobes that a program can list.
+constexpr std::uint32_t most_nodes = 4096, most_lobes = 10000000;
 
 /// Lobes of a pack through the runtime's own contraction.
 class PackSource : public Source {
@@ -108,6 +132,15 @@ class PackSource : public Source {
         const OpenResult opened = open_pack(bytes_.data(), bytes_.size());
         if (opened.status != PackStatus::ok) throw Error("{}: expected a pack: {}", path, describe(opened.status));
         pack_ = opened.pack;
+        for (const TableView& table : pack_.tables)
+            if (table) check_nodes(table, path);
+        const auto text = nlohmann::json::parse(pack_.text, pack_.text + pack_.text_bytes, nullptr, false);
+        for (const TableKind kind : lobe_kinds) {
+            const auto path =
+                nlohmann::json::json_pointer(fmt::format("/fit/{}/input_noise", medulla::tables::name_of(kind)));
+            const bool known = text.is_object() && text.contains(path) && text[path].is_number();
+            noise_[static_cast<std::size_t>(kind)] = known ? text[path].get<double>() : 0.0;
+        }
     }
 
     bool has(TableKind kind) const override { return static_cast<bool>(pack_[kind]); }
@@ -157,13 +190,37 @@ class PackSource : public Source {
         return out;
     }
 
+    double noise(TableKind kind, const Parameters&) const override { return noise_[static_cast<std::size_t>(kind)]; }
+
     double back_fraction(const Parameters& at) const override {
         const TableView& table = pack_[TableKind::back_fraction];
         if (!table) throw Error("the pack has no table of the slab's energies");
         return static_cast<double>(scalar(table, contract(table, query(at))));
     }
 
+    double survival(const Parameters& at) const override {
+        if (!absorbs()) return 1;
+        const TableView& table = pack_[TableKind::survival];
+        if (!table) throw Error("the pack has no table of what absorption leaves");
+        return survival_of(at.absorption, static_cast<double>(scalar(table, contract(table, query(at)))));
+    }
+
   private:
+    /// Nodes are for information: nothing in the pack bounds them, but programs make one lobe of each.
+    static void check_nodes(const TableView& table, const std::string& path) {
+        double lobes = 1;
+        for (std::uint32_t k = 0; k < table.layout.axis_count; ++k) {
+            const std::uint32_t nodes = table.layout.axes[k].nodes;
+            if (nodes < 1 || nodes > most_nodes)
+                throw Error("{}: {}: expected 1 to {} nodes on an axis, found {}", path,
+                            name_of(static_cast<TableKind>(table.layout.kind)), most_nodes, nodes);
+            if (k < table.parameter_axes()) lobes *= nodes;
+        }
+        if (lobes > most_lobes)
+            throw Error("{}: {}: expected at most {} lobes, found {:g}", path,
+                        name_of(static_cast<TableKind>(table.layout.kind)), most_lobes, lobes);
+    }
+
     struct Point {
         std::uint32_t span;
         bool negative;
@@ -197,6 +254,7 @@ class PackSource : public Source {
 
     std::vector<unsigned char> bytes_;
     PackView pack_;
+    std::array<double, lobe_kinds.size()> noise_ = {};
     mutable std::mutex mutex_;
     mutable std::map<std::pair<TableKind, std::size_t>, std::vector<Point>> points_;
 };
@@ -235,6 +293,8 @@ const char* name_of(TableKind kind) {
             return "longitudinal forward";
         case TableKind::back_fraction:
             return "longitudinal energies";
+        case TableKind::survival:
+            return "azimuthal survival";
     }
     return "?";
 }
@@ -243,6 +303,8 @@ const char* exit_name(TableKind kind) { return kind == TableKind::azimuthal ? "p
 
 void Source::check(TableKind kind, const Parameters& at, const std::string& path) const {
     if (!has(kind)) throw Error("{}: expected a table of {} lobes, found none", path, name_of(kind));
+    if (kind == TableKind::azimuthal && at.absorption != 0 && !absorbs())
+        throw Error("{}: expected absorption 0, since there is no such axis, found {:g}", path, at.absorption);
     for (const Axis& axis : parameter_axes(kind)) {
         const double x = at[axis.name], low = axis.values.front(), high = axis.values.back();
         // Packs keep their axes in float: half a unit in its last place is no reason to refuse an end.
@@ -252,8 +314,14 @@ void Source::check(TableKind kind, const Parameters& at, const std::string& path
     }
 }
 
+bool Source::absorbs() const {
+    if (!has(TableKind::azimuthal)) return false;
+    const std::vector<Axis> axes = parameter_axes(TableKind::azimuthal);
+    return std::any_of(axes.begin(), axes.end(), [](const Axis& axis) { return axis.name == "absorption"; });
+}
+
 double energy_of(const Source& source, TableKind kind, const Parameters& at) {
-    if (kind == TableKind::azimuthal) return azimuthal_energy(at.sigma, at.h);
+    if (kind == TableKind::azimuthal) return azimuthal_energy(at.sigma, at.h) * source.survival(at);
     const double back = source.back_fraction(at), total = longitudinal_energy(at.sigma, at.theta_i);
     return total * (kind == TableKind::longitudinal_back ? back : 1 - back);
 }
@@ -292,18 +360,26 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
         error.kind = kind;
         error.lobes = 1;
         for (const Axis& axis : axes) error.lobes *= axis.size();
-        std::vector<double> misfit(error.lobes), norm(error.lobes), energy(error.lobes), least(error.lobes);
+        const bool survives = kind == TableKind::azimuthal && reference.absorbs() && candidate.absorbs();
+        std::vector<double> misfit(error.lobes), norm(error.lobes), energy(error.lobes), least(error.lobes),
+            survival(error.lobes, 0.0);
         const auto parameters = [&](std::size_t index) {
             Parameters at;
             for (std::size_t k = axes.size(); k-- > 0; index /= axes[k].size())
                 at.set(axes[k].name, axes[k].values[index % axes[k].size()]);
             return at;
         };
-#pragma omp parallel for schedule(static)
-        for (std::size_t i = 0; i < error.lobes; ++i) {
+        std::vector<double> noise(error.lobes), back_share(error.lobes, 0.0);
+        const bool shares = kind != TableKind::azimuthal && reference.has(TableKind::back_fraction) &&
+                            candidate.has(TableKind::back_fraction);
+        const std::atomic<bool> never{false};
+        in_parallel(error.lobes, 0, never, [&](std::size_t i) {
             const Parameters at = parameters(i);
             const std::vector<double> a = reference.lobe(kind, at, bins);
             std::vector<double> b = candidate.lobe(kind, at, bins);
+            noise[i] = reference.noise(kind, at);
+            if (shares && at.sigma > 0)  // else there is no energy to share
+                back_share[i] = std::abs(candidate.back_fraction(at) - reference.back_fraction(at));
             const double width = (kind == TableKind::azimuthal ? 2 * pi : pi) / static_cast<double>(bins);
             double sum = 0, low = b[0];
             for (std::size_t j = 0; j < bins; ++j) {
@@ -312,19 +388,25 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
                 b[j] -= a[j];
             }
             norm[i] = norm2(a), misfit[i] = norm2(b), energy[i] = std::abs(sum * width - 1), least[i] = low;
-        }
-        double total = 0, total_misfit = 0;
+            if (survives) survival[i] = std::abs(candidate.survival(at) - reference.survival(at));
+        });
+        if (survives) error.survival = *std::max_element(survival.begin(), survival.end());
+        double total = 0, total_misfit = 0, total_noise = 0;
         error.least = least[0];
         std::size_t worst = 0;
         for (std::size_t i = 0; i < error.lobes; ++i) {
             total += norm[i];
             total_misfit += misfit[i];
-            error.energy = std::max(error.energy, energy[i]);
+            total_noise += norm[i] * noise[i] * noise[i];
+            error.worst_claim = std::max(error.worst_claim, std::sqrt(misfit[i] / norm[i] + noise[i] * noise[i]));
+            error.energy = std::isnan(energy[i]) ? energy[i] : std::max(error.energy, energy[i]);  // a NaN stays
             error.least = std::min(error.least, least[i]);
             if (misfit[i] * norm[worst] > misfit[worst] * norm[i]) worst = i;
         }
         error.relative = std::sqrt(total_misfit / total);
         error.worst = std::sqrt(misfit[worst] / norm[worst]);
+        error.noise = std::sqrt(total_noise / total), error.claim = std::hypot(error.relative, error.noise);
+        error.back_share = *std::max_element(back_share.begin(), back_share.end());
         const Parameters at = parameters(worst);
         for (const Axis& axis : axes)
             error.worst_at += fmt::format("{}{} {:g}", error.worst_at.empty() ? "" : ", ", axis.name, at[axis.name]);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,14 +40,21 @@ class Source {
     virtual std::size_t bins(TableKind kind) const = 0;
     /// Averages over `bins` equal bins of the normalised lobe [1/radian].
     virtual std::vector<double> lobe(TableKind kind, const Parameters& at, std::size_t bins) const = 0;
+    /// Relative L2 standard error of a lobe (between nodes: interpolated); of a pack, that of all lobes of the table it
+    /// was made from, as its provenance has it. 0 where nothing is known.
+    virtual double noise(TableKind kind, const Parameters& at) const = 0;
     /// Share of the slab's scattered energy that leaves backward.
     virtual double back_fraction(const Parameters& at) const = 0;
+    /// Share of the disc's scattered energy that absorption leaves; 1 where there is no such axis.
+    virtual double survival(const Parameters& at) const = 0;
+    bool absorbs() const;  ///< whether azimuthal lobes have an axis of absorption
 
     /// Throws Error that names the axis, its range and the value if `at` lies outside; checks presence first.
     void check(TableKind kind, const Parameters& at, const std::string& path) const;
 };
 
-/// The energy that belongs to a lobe: closed form, times the share of its side for the slab.
+/// The energy that belongs to a lobe: closed form, times the share of its side for the slab, times what absorption
+/// leaves for the disc.
 double energy_of(const Source& source, TableKind kind, const Parameters& at);
 
 /// Opens a tables file or a pack; the name `default` is the pack built into this program. Throws Error.
@@ -60,12 +68,17 @@ std::vector<unsigned char> read_pack(const std::string& path);
 /// Error of one source against another, over every node of the reference.
 struct LobeError {
     TableKind kind;
-    double relative = 0;   ///< L2 over all lobes and bins, relative to the reference's
-    double worst = 0;      ///< greatest relative L2 of one lobe
-    std::string worst_at;  ///< its parameters
-    double energy = 0;     ///< greatest |integral - 1| of a lobe
-    double least = 0;      ///< least value (bin average)
+    double relative = 0;             ///< L2 over all lobes and bins, relative to the reference's
+    double worst = 0;                ///< greatest relative L2 of one lobe
+    std::string worst_at;            ///< its parameters
+    double energy = 0;               ///< greatest |integral - 1| of a lobe
+    double least = 0;                ///< least value (bin average)
+    std::optional<double> survival;  ///< greatest difference of survivals, where both have an axis of absorption
     std::size_t lobes = 0;
+    /// Relative L2 standard error of the reference. What the candidate is off from the truth by cannot be known better:
+    /// `claim` and `worst_claim` are the errors above with it added in squares.
+    double noise = 0, claim = 0, worst_claim = 0;
+    double back_share = 0;  ///< slab: greatest difference of the shares of energy that leave backward
 };
 std::vector<LobeError> compare(const Source& reference, const Source& candidate);
 

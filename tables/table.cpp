@@ -1,5 +1,6 @@
 #include "tables/table.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "medulla/lookup.hpp"
@@ -11,6 +12,10 @@ const Axis& Table::axis(const std::string& axis_name) const {
     for (const Axis& a : axes)
         if (a.name == axis_name) return a;
     throw Error("table {}: no axis {}", name, axis_name);
+}
+
+bool Table::has_axis(const std::string& axis_name) const {
+    return std::any_of(axes.begin(), axes.end(), [&](const Axis& a) { return a.name == axis_name; });
 }
 
 std::size_t Table::cells() const {
@@ -65,9 +70,112 @@ std::vector<const Table*> Tables::present() const {
 std::optional<double> closed_form_energy(const Table& table, std::size_t cell) {
     if (table.name == "longitudinal")
         return longitudinal_energy(table.parameter(cell, "sigma"), table.parameter(cell, "theta_i"));
-    for (const Axis& axis : table.axes)
-        if (axis.name == "absorption") return std::nullopt;
+    if (table.has_axis("absorption") && table.parameter(cell, "absorption") > 0) return std::nullopt;
     return azimuthal_energy(table.parameter(cell, "sigma"), table.parameter(cell, "h"));
+}
+
+namespace {
+
+/// Energy of a cell that absorbs: no more than its first collisions leave unabsorbed, no more than at the absorption
+/// before.
+template <class Fail>
+void check_absorbed(const Table& table, std::size_t cell, const Fail& fail) {
+    const double sigma = table.parameter(cell, "sigma"), a = table.parameter(cell, "absorption"),
+                 most = sigma / (sigma + a) * azimuthal_energy(sigma + a, table.parameter(cell, "h"));
+    const double energy = table.energy[cell], error = table.energy_error[cell];
+    if (!(energy <= most + 5 * error + 1e-12))
+        fail(fmt::format("expected an energy of at most {:.9g}, found {:.9g} with standard error {:.2e}", most, energy,
+                         error));
+    const std::size_t step = table.axis("h").size(), along = table.position(cell)[2];
+    if (along == 0) return;
+    const double before = table.energy[cell - step], noise = std::hypot(error, table.energy_error[cell - step]);
+    if (!(energy <= before + 5 * noise + 1e-12))
+        fail(fmt::format(
+            "expected at most the energy {:.9g} of less absorption, found {:.9g} with standard error {:.2e}", before,
+            energy, noise));
+}
+
+}  // namespace
+
+void check_cells(const Table& table, const std::string& where) {
+    const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
+    const double width = bin_width(table.exit());
+    for (std::size_t cell = 0; cell < table.cells(); ++cell) {
+        const auto fail = [&](const std::string& what) {
+            throw Error("{}: {}: {}", where, table.describe(cell), what);
+        };
+        double sum = 0;
+        for (std::size_t b = 0; b < table.bins(); ++b) {
+            const auto value = static_cast<double>(table.lobe_of(cell)[b]);
+            if (!(value >= 0)) fail(fmt::format("expected a density >= 0, found {:g}", value));
+            sum += value * width;
+        }
+        // Sums of float values: each is rounded by 2^-24 relative.
+        if (!(std::abs(sum - 1) <= 1e-6)) fail(fmt::format("expected a lobe of integral 1, found {:.9g}", sum));
+        for (const auto* array : {&table.energy, &table.energy_error, &table.standard_error, &table.mean_length})
+            if (!((*array)[cell] >= 0))
+                fail(fmt::format("expected an energy, errors and a length >= 0, found {:g}", (*array)[cell]));
+        if (cell % sides != 0) continue;
+        double energy = 0, variance = 0;
+        for (std::size_t s = 0; s < sides; ++s) {
+            energy += table.energy[cell + s];
+            variance += table.energy_error[cell + s] * table.energy_error[cell + s];
+        }
+        const std::optional<double> expected = closed_form_energy(table, cell);
+        if (!expected) {
+            check_absorbed(table, cell, fail);
+            continue;
+        }
+        if (!(std::abs(energy - *expected) <= 5 * std::sqrt(variance) + 1e-12))
+            fail(fmt::format("expected energy {:.9g}, found {:.9g} with standard error {:.2e}", *expected, energy,
+                             std::sqrt(variance)));
+    }
+}
+
+double extrapolate(const std::vector<double>& x, const std::vector<double>& y, double to) {
+    double value = 0;
+    for (std::size_t a = 0; a < x.size(); ++a) {
+        double lagrange = 1;
+        for (std::size_t b = 0; b < x.size(); ++b)
+            if (b != a) lagrange *= (to - x[b]) / (x[a] - x[b]);
+        value += lagrange * y[a];
+    }
+    return value;
+}
+
+std::vector<double> survival_lengths(const Table& table) {
+    if (!table.has_axis("absorption")) return {};
+    std::vector<double> lengths = table.mean_length;
+    const std::vector<double>&sigma = table.axis("sigma").values, &h = table.axis("h").values;
+    const auto unknown = [&](double s, double offset) { return !(azimuthal_energy(s, offset) > 0); };
+    for (std::size_t cell = 0; cell < table.cells(); ++cell) {
+        const double a = table.parameter(cell, "absorption"), s = table.parameter(cell, "sigma"),
+                     offset = table.parameter(cell, "h");
+        if (a == 0 || unknown(s, offset)) continue;
+        const double left = table.energy[cell] / azimuthal_energy(s, offset);
+        if (!(left > 0)) throw Error("table {}: {}: expected an energy > 0", table.name, table.describe(cell));
+        lengths[cell] = -std::log(left) / a;
+    }
+    // Three known neighbours, `step` cells apart; where there are fewer, the polynomial through those.
+    const auto extend = [&](std::size_t cell, std::ptrdiff_t step, const std::vector<double>& x) {
+        std::vector<double> y;
+        for (std::size_t i = 1; i <= x.size(); ++i)
+            y.push_back(lengths[cell + static_cast<std::size_t>(step * static_cast<std::ptrdiff_t>(i))]);
+        if (!x.empty()) lengths[cell] = extrapolate(x, y, 0);
+    };
+    std::vector<double> half_chords, thin;
+    for (std::size_t i = h.size() - 1; i-- > 0 && half_chords.size() < 3;)
+        half_chords.push_back(std::sqrt((1 - h[i]) * (1 + h[i])));
+    for (std::size_t i = 1; i < sigma.size() && thin.size() < 3; ++i) thin.push_back(sigma[i]);
+    const auto row = static_cast<std::ptrdiff_t>(table.cells() / sigma.size());
+    for (const bool rim : {true, false})  // the rim first, so that sigma = 0 has neighbours there
+        for (std::size_t cell = 0; cell < table.cells(); ++cell) {
+            const double s = table.parameter(cell, "sigma"), offset = table.parameter(cell, "h");
+            if (table.parameter(cell, "absorption") == 0) continue;
+            if (rim && s > 0 && offset == 1) extend(cell, -1, half_chords);
+            if (!rim && s == 0) extend(cell, row, thin);
+        }
+    return lengths;
 }
 
 std::vector<double> side_lobes(const Table& table, std::size_t side) {

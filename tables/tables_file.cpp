@@ -101,19 +101,27 @@ void write_attribute(hid_t object, const char* name, const std::string& text, co
     check(H5Awrite(attribute, type, text.c_str()), failed);
 }
 
-void write_attribute(hid_t object, const char* name, std::uint64_t value, const std::string& where) {
-    const std::string failed = fmt::format("{}: attribute {} cannot be written", where, name);
-    const Handle space(H5Screate(H5S_SCALAR), H5Sclose, failed);
-    const Handle attribute(H5Acreate2(object, name, H5T_STD_U64LE, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, failed);
-    check(H5Awrite(attribute, H5T_NATIVE_UINT64, &value), failed);
-}
-
-struct ArrayType {
+struct NumberType {
     hid_t file, memory;
 };
 
+void write_number(hid_t object, const char* name, const NumberType& type, const void* value, const std::string& where) {
+    const std::string failed = fmt::format("{}: attribute {} cannot be written", where, name);
+    const Handle space(H5Screate(H5S_SCALAR), H5Sclose, failed);
+    const Handle attribute(H5Acreate2(object, name, type.file, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose, failed);
+    check(H5Awrite(attribute, type.memory, value), failed);
+}
+
+void write_attribute(hid_t object, const char* name, std::uint64_t value, const std::string& where) {
+    write_number(object, name, {H5T_STD_U64LE, H5T_NATIVE_UINT64}, &value, where);
+}
+
+void write_attribute(hid_t object, const char* name, double value, const std::string& where) {
+    write_number(object, name, {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE}, &value, where);
+}
+
 /// Writes one array in chunks, each with a checksum, whatever the compression: no flipped bit is read silently.
-void write_array(hid_t group, const std::string& name, const std::vector<hsize_t>& shape, const ArrayType& type,
+void write_array(hid_t group, const std::string& name, const std::vector<hsize_t>& shape, const NumberType& type,
                  const void* data, Compression compression, const std::vector<hsize_t>& chunk,
                  const std::string& where) {
     const std::string failed = fmt::format("{}/{}: cannot be written", where, name);
@@ -156,8 +164,10 @@ void write_table(hid_t file, const Table& table, Compression compression, const 
     write_attribute(group, "method", table.method, where);
     write_attribute(group, "seed", table.seed, where);
     write_attribute(group, "paths", table.paths, where);
+    if (table.target_error > 0) write_attribute(group, "target_error", table.target_error, where);
+    if (table.time_budget > 0) write_attribute(group, "time_budget", table.time_budget, where);
 
-    const ArrayType real64 = {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE}, real32 = {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT};
+    const NumberType real64 = {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE}, real32 = {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT};
     std::vector<hsize_t> shape;
     for (const Axis& axis : table.axes) {
         shape.push_back(axis.size());
@@ -221,6 +231,22 @@ std::uint64_t read_whole(hid_t object, const char* name, const std::string& wher
     return value;
 }
 
+/// A positive number, 0 where there is none.
+double read_optional(hid_t object, const char* name, const std::string& where) {
+    const htri_t exists = H5Aexists(object, name);
+    if (exists == 0) return 0;
+    const std::string failed = fmt::format("{}: expected a number above 0 in attribute {}", where, name);
+    check(exists, failed);
+    const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, failed);
+    const Handle type(H5Aget_type(attribute), H5Tclose, failed);
+    const Handle space(H5Aget_space(attribute), H5Sclose, failed);
+    if (H5Tget_class(type) != H5T_FLOAT || H5Sget_simple_extent_npoints(space) != 1) throw Error("{}", failed);
+    double value = 0;
+    check(H5Aread(attribute, H5T_NATIVE_DOUBLE, &value), failed);
+    if (!(std::isfinite(value) && value > 0)) throw Error("{}, found {:g}", failed, value);
+    return value;
+}
+
 std::string shape_text(const std::vector<hsize_t>& shape) {
     std::string text;
     for (const hsize_t n : shape) text += (text.empty() ? "" : " x ") + std::to_string(n);
@@ -239,6 +265,7 @@ void check_storage(hid_t set, hid_t type, const std::vector<hsize_t>& shape, con
         if (chunk[k] < 1 || chunk[k] > shape[k])
             throw Error("{}: expected chunks within shape {}, found {}", where, shape_text(shape), shape_text(chunk));
     const int filters = H5Pget_nfilters(properties);
+    int compressors = 0;
     for (int i = 0; i < filters; ++i) {
         unsigned flags = 0, config = 0;
         std::size_t count = 0;
@@ -246,6 +273,9 @@ void check_storage(hid_t set, hid_t type, const std::vector<hsize_t>& shape, con
             H5Pget_filter2(properties, static_cast<unsigned>(i), &flags, &count, nullptr, 0, nullptr, &config);
         if (id != H5Z_FILTER_SHUFFLE && id != H5Z_FILTER_DEFLATE && id != H5Z_FILTER_FLETCHER32 && id != zstd_filter_id)
             throw Error("{}: expected shuffle, gzip, zstd and Fletcher-32 filters, found filter {}", where, id);
+        // One after another they would multiply how far few bytes expand: gzip alone 1032 times, zstd to one chunk.
+        compressors += id == H5Z_FILTER_DEFLATE || id == zstd_filter_id;
+        if (compressors > 1) throw Error("{}: expected one compression, found several", where);
     }
 }
 
@@ -290,6 +320,8 @@ Table read_table(hid_t file, const std::string& name, const std::string& path) {
     table.method = read_text(group, "method", where);
     table.seed = read_whole(group, "seed", where);
     table.paths = read_whole(group, "paths", where);
+    table.target_error = read_optional(group, "target_error", where);
+    table.time_budget = read_optional(group, "time_budget", where);
     std::vector<const char*> names = {"sigma", "g"};
     if (name == "azimuthal") {
         if (H5Lexists(group, "absorption", H5P_DEFAULT) > 0) names.push_back("absorption");
@@ -314,6 +346,7 @@ Table read_table(hid_t file, const std::string& name, const std::string& path) {
     table.energy_error = read_array<double>(group, "energy_error", H5T_NATIVE_DOUBLE, cells, where);
     table.standard_error = read_array<double>(group, "standard_error", H5T_NATIVE_DOUBLE, cells, where);
     table.mean_length = read_array<double>(group, "mean_length", H5T_NATIVE_DOUBLE, cells, where, true);
+    check_cells(table, where);
     return table;
 }
 
@@ -323,6 +356,8 @@ void write_tables(const std::string& path, const Tables& tables, Compression com
                   const std::string& temporary) {
     quiet();
     register_zstd_filter();
+    // Nothing is written that would be refused when it is read.
+    for (const Table* table : tables.present()) check_cells(*table, fmt::format("{}: /{}", path, table->name));
     // The file is made in memory and written by us: HDF5 closes a file on a full disk without a word.
     PendingFile pending(path, temporary);
     Image image;

@@ -18,6 +18,13 @@ namespace {
 
 Factors row_major(const CpModel& model) { return Factors(model.factors.begin(), model.factors.end()); }
 
+/// Inner products of the components of a canonical model, weights left out.
+Eigen::MatrixXd cosines_of(const CpModel& model) {
+    Eigen::MatrixXd cosines = Eigen::MatrixXd::Ones(model.weights.size(), model.weights.size());
+    for (const auto& factor : model.factors) cosines.array() *= (factor.transpose() * factor).array();
+    return cosines;
+}
+
 }  // namespace
 
 std::vector<std::size_t> CpModel::shape() const {
@@ -96,11 +103,14 @@ void canonicalise(CpModel& model) {
     model = std::move(sorted);
 }
 
+double norm(const CpModel& model) {
+    return std::sqrt(std::max(0.0, model.weights.dot(cosines_of(model) * model.weights)));
+}
+
 Degeneracy degeneracy(const CpModel& model, double tensor_norm) {
     Degeneracy result;
     const Eigen::Index rank = model.weights.size();
-    Eigen::MatrixXd cosines = Eigen::MatrixXd::Ones(rank, rank);
-    for (const auto& factor : model.factors) cosines.array() *= (factor.transpose() * factor).array();
+    const Eigen::MatrixXd cosines = cosines_of(model);
     for (Eigen::Index r = 0; r < rank; ++r)
         for (Eigen::Index s = 0; s < r; ++s)
             if (model.weights[r] > 0 && model.weights[s] > 0)

@@ -34,6 +34,10 @@ double relative_error(const Tensor& tensor, const CpModel& model);
 /// A component of weight 0 gets the first unit vector in every factor.
 void canonicalise(CpModel& model);
 
+/// Norm of the full tensor of a canonical model, from the cosines of its components: rounding is that of terms up to
+/// (sum of weights)^2.
+double norm(const CpModel& model);
+
 /// How far a model is from a sum of components that do not cancel.
 struct Degeneracy {
     double least_cosine = 1;  ///< of any pair of components: -1 where two cancel, 1 for a single component
@@ -82,9 +86,8 @@ struct CpOptions {
     std::optional<int> max_sweeps;    ///< ALS sweeps or LM steps per start, >= 1; unset: ALS 500, LM 100
     std::optional<double> tolerance;  ///< see Stop::converged; 0 never fires; unset: ALS 1e-6, LM 1e-3
     std::uint64_t seed = 1;           ///< same seed, same bytes, for any number of threads
-    /// Complete solves from different Gaussian starts, >= 1; the least error is kept. Unset: ALS 1, LM 4 up to rank 32
-    /// and
-    /// 1 beyond.
+    /// Complete solves from different Gaussian starts, >= 1; the least error is kept. Unset: ALS 1, LM 2 up to rank 32
+    /// and 1 beyond.
     std::optional<int> restarts;
     /// Penalty ridge * sum |factor|^2 on balanced factors of the unit-norm tensor (half of it beside half the squared
     /// error): what keeps components from cancelling.

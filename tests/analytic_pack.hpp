@@ -143,12 +143,11 @@ class PackBuilder {
                 table.axes[k].nodes = table.axes[k].spans = spans;
                 table.axes[k].knots_offset = put(knots.data(), knots.size() * sizeof knots[0]);
                 table.axes[k].rows_offset = put(rows.data(), rows.size());
-                if (k + 1 == spec.axes.size())
+                if (is_lobe(spec.kind) && k + 1 == spec.axes.size())
                     integrals = exit_integrals(knots, rows, spans, table.rank_stride, padded_rank(table.even_rank));
             }
             table.scales_offset = put(scales.data(), scales.size() * 4);
-            if (spec.kind != TableKind::back_fraction)
-                table.integrals_offset = put(integrals.data(), integrals.size() * 4);
+            if (is_lobe(spec.kind)) table.integrals_offset = put(integrals.data(), integrals.size() * 4);
             tables.push_back(table);
         }
         PackHeader header = {};

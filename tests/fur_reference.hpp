@@ -60,13 +60,16 @@ inline Lobes near_lobes(const FurParameters<3>& p, const PackView& pack, double 
         l.M[k] = truncated(theta_r, -theta_i + shift[k] * double(p.alpha), rough[k] * double(p.beta_m));
     const double ms = double(p.sigma_ms), ma = double(p.sigma_ma);
     const bool scattered = with_scattered && std::abs(inside) < kappa && ms > 0;
+    const bool tabled = absorbs(pack);  // the tables know what the medulla absorbs; else T_b has it
     double C[3] = {}, M = 0;
     if (scattered) {
         const float sigma = float(ms * kappa / cos_t), side = h < 0 ? -1.0f : 1.0f;
         LobeQuery q;
         q.sigma = sigma, q.g = p.g, q.h = float(std::min(1.0, std::abs(inside) / kappa));
+        if (tabled) q.absorption = float(ma * kappa / cos_t);
         const TableView& table = pack[TableKind::azimuthal];
-        const double E = 1 - std::exp(-2 * s_m * ms / cos_t);
+        const double E = (1 - std::exp(-2 * s_m * ms / cos_t)) *
+                         (tabled ? double(survival(pack, q.sigma, q.g, q.h, q.absorption)) : 1);
         for (int k = 1; k <= 2; ++k) {
             const double centre = (gamma_t - gamma_i) + (k - 1) * (pi + 2 * gamma_t);
             C[k] = E * double(lobe(table, contract(table, q), side * float(phi - centre - pi)));
@@ -78,7 +81,7 @@ inline Lobes near_lobes(const FurParameters<3>& p, const PackView& pack, double 
     l.M[3] = l.M[4] = M;
     for (int c = 0; c < 3; ++c) {
         const double ca = double(p.sigma_ca[c]);
-        const double T_b = std::exp(-(kappa * ma + (1 - kappa) * ca) / cos_t);
+        const double T_b = std::exp(-((tabled ? 0 : kappa * ma) + (1 - kappa) * ca) / cos_t);
         for (int k = 0; k < 3; ++k) {
             const double A = k == 0 ? F
                                     : std::pow(1 - F, 2) * std::pow(F, k - 1) *

@@ -48,7 +48,7 @@ class Programs(unittest.TestCase):
     def test_wrong_words_are_status_2(self):
         for words in (["--sigma-range", "2:1"], ["--sigma-range", "x"], ["--bins", "7"], ["--bins", "0"],
                       ["--g-range", "0:1"], ["--h-range", "0:2"], ["--theta-range", "0:91"], ["--table", "both!"],
-                      ["--paths", "0"], ["--paths", "-5"], ["--nonsense"], ["--method", "magic"], ["--threads", "-1"]):
+                      ["--paths", "0"], ["--paths", "-5"], ["--absorption-range", "-1:2"], ["--nonsense"], ["--method", "magic"], ["--threads", "-1"]):
             self.fails(2, "medulla-precompute", "-o", self.path("never.h5"), *words, names=[words[0]])
             self.assertFalse(os.path.exists(self.path("never.h5")))
         self.fails(2, "furtable")
@@ -57,6 +57,61 @@ class Programs(unittest.TestCase):
         self.fails(2, "furtable", "query", "t.h5", "--table", "azimuthal", "--sigma", 1, "--g", 0.3)
         self.fails(2, "furtable", "query", "t.h5", "--table", "longitudinal", "--sigma", 1, "--g", 0.3, "--h", 0.1)
         self.fails(2, "furtable", "plot", "t.h5", "-o", "x.jpg")
+
+    def test_target_error(self):
+        coarse = SMALL[:-4] + ["--progress", "none", "--json", "--target-error", "0.05"]
+        for method in ("deterministic", "mc", "analog", "auto"):
+            path = self.path(method + ".h5")
+            status, out, err = run("medulla-precompute", "-o", path, *coarse, "--method", method)
+            self.assertEqual(status, 0, err)
+            for table in json.loads(out)["tables"].values():
+                self.assertEqual(table["cells_above_target"], 0)
+                self.assertLessEqual(table["worst_standard_error"], 0.05)
+            info = json.loads(run("furtable", "info", path, "--json")[1])
+            self.assertEqual(info["tables"]["azimuthal"]["target_error"], 0.05)
+            self.assertEqual(info["tables"]["azimuthal"]["paths"], 0)
+        self.fails(2, "medulla-precompute", "--target-error", "0", names=["--target-error"])
+        self.fails(2, "medulla-precompute", "--target-error", "0.01", "--paths", "7")
+        self.fails(1, "furtable", "merge", self.path("mc.h5"), self.path("t.h5"), "-o", self.path("no.h5"))
+
+    def test_time_budget_betters_what_is_coarse(self):
+        words = SMALL[:-4] + ["--progress", "none", "--json"]
+        worst = []
+        for seconds in ("1e-9", "1.5"):
+            status, out, err = run("medulla-precompute", "-o", self.path(f"b{seconds}.h5"), *words, "--time-budget",
+                                   seconds)
+            self.assertEqual(status, 0, err)
+            worst.append(max(t["worst_standard_error"] for t in json.loads(out)["tables"].values()))
+            self.assertEqual(run("furtable", "verify", self.path(f"b{seconds}.h5"))[0], 0)
+        self.assertLess(worst[1], worst[0])
+
+    def test_scene_is_a_part_of_the_whole(self):
+        scene = self.path("scene.json")
+        with open(scene, "w") as f:
+            json.dump({"materials": [{"name": "soft", "eta": 1.6, "kappa": 0.9, "sigma_ms": 1, "g": 0.1},
+                                     {"name": "hair", "kappa": 0}]}, f)
+        words = ["--sigma-range", "0:9:12", *SMALL[2:]]
+        status, out, err = run("medulla-precompute", "--scene", scene, "--dry-run", "--json", *words)
+        self.assertEqual(status, 0, err)
+        plan = json.loads(out)
+        self.assertLess(plan["share_of_whole"], 1)
+        self.assertGreater(plan["seconds"], 0)
+        sigma = plan["tables"]["azimuthal"]["sigma"]
+        self.assertLess(sigma[1], 0.9)                             # sigma_ms kappa, and one node more
+        self.assertGreater(sigma[-2], 0.9 / math.sqrt(1 - 1 / 1.6 ** 2))
+        self.assertEqual(run("medulla-precompute", "--scene", scene, "-o", self.path("scene.h5"), *words)[0], 0)
+        self.assertEqual(run("medulla-precompute", "-o", self.path("whole.h5"), *words)[0], 0)
+        # The whole table holds the scene's cells byte for byte, so that merging them adds nothing.
+        self.assertEqual(run("furtable", "merge", self.path("scene.h5"), self.path("whole.h5"), "-o",
+                             self.path("merged.h5"))[0], 0)
+        hashes = [json.loads(run("furtable", "info", self.path(name), "--json")[1])["sha256"]
+                  for name in ("merged.h5", "whole.h5")]
+        self.assertEqual(hashes[0], hashes[1])
+        self.fails(1, "medulla-precompute", "--scene", scene, "--sigma-range", "3:9:4", names=["soft", "sigma"])
+        with open(scene, "w") as f:
+            json.dump({"materials": [{"name": "hair", "kappa": 0}]}, f)
+        self.fails(1, "medulla-precompute", "--scene", scene, names=["scene.json", "/materials"])
+        self.fails(1, "medulla-precompute", "--scene", self.path("none.json"), names=["none.json"])
 
     def test_unreadable_files_are_status_1(self):
         with open(self.path("text"), "w") as f:
@@ -157,10 +212,20 @@ class Programs(unittest.TestCase):
             self.assertEqual(run("furtable", "verify", self.path(file))[0], 0)
             info = json.loads(run("furtable", "info", self.path(file), "--json")[1])
             self.assertIn("azimuthal", info["tables"])
-        errors = json.loads(run("furtable", "diff", self.path("t.h5"), self.path("t.furpack"), "--json")[1])["errors"]
+        diff = json.loads(run("furtable", "diff", self.path("t.h5"), self.path("t.furpack"), "--json")[1])
+        errors = diff["errors"]
+        for error in errors.values():  # nothing is claimed below the table's noise
+            self.assertGreater(error["noise"], 0)
+            self.assertGreaterEqual(error["relative_l2_with_noise"], max(error["noise"], error["relative_l2"]))
+        verified = json.loads(run("furtable", "verify", self.path("t.furpack"), "--json")[1])[self.path("t.furpack")]
+        self.assertEqual(verified["degeneracy"], diff["degeneracy"])
+        self.assertEqual(verified["energy_error"], max(e["energy_error"] for e in errors.values()))
         self.assertEqual(set(errors), {"azimuthal", "longitudinal back", "longitudinal forward"})
         same = json.loads(run("furtable", "diff", self.path("t.h5"), self.path("t.h5"), "--json")[1])["errors"]
         self.assertEqual(max(e["relative_l2"] for e in same.values()), 0)
+        other = ["50" if word == "72" else word for word in SMALL]
+        self.assertEqual(run("medulla-precompute", "-o", self.path("bins.h5"), *other)[0], 0)
+        self.fails(1, "furtable", "diff", "t.h5", "bins.h5", names=["t.h5", "bins.h5", "72 bins", "50"])
         for extension in ("svg", "html"):
             picture = self.path("p." + extension)
             self.assertEqual(run("furtable", "plot", self.path("t.h5"), self.path("t.furpack"), "-o", picture)[0], 0)
@@ -171,6 +236,107 @@ class Programs(unittest.TestCase):
         self.assertEqual(status, 0, err)
         self.assertEqual(numpy.load(self.path("a.npy")).shape, (5, 3, 4, 72))
         self.assertEqual(run("furtable", "export", self.path("t.furpack"), "--format", "cpp", "-o", self.path("p.hpp"))[0], 0)
+
+    def test_axis_of_absorption(self):
+        words = ["--table", "azimuthal", "--absorption-range", "0:2:4", *SMALL]
+        file, pack = self.path("absorb.h5"), self.path("absorb.furpack")
+        for share in (1, 2):
+            self.assertEqual(run("medulla-precompute", "-o", self.path("shares.h5"), "--shard", f"{share}/2", *words)[0], 0)
+        self.assertEqual(run("medulla-precompute", "-o", file, *words)[0], 0)
+        self.assertEqual(run("furtable", "merge", self.path("shares.h5.shards"), "-o", self.path("merged.h5"))[0], 0)
+        tables = [json.loads(run("furtable", "info", f, "--json")[1]) for f in (file, self.path("merged.h5"))]
+        self.assertEqual(tables[0]["sha256"], tables[1]["sha256"])
+        axes = tables[0]["tables"]["azimuthal"]["axes"]
+        self.assertEqual([a["name"] for a in axes], ["sigma", "g", "absorption", "h", "phi"])
+        self.assertEqual((len(axes[2]["values"]), axes[2]["values"][0], axes[2]["values"][-1]), (4, 0, 2))
+        status, out, err = run("furtable", "compress", file, "--rank", 24)
+        self.assertEqual(status, 0, err)
+        info = json.loads(run("furtable", "info", pack, "--json")[1])
+        self.assertEqual([a["name"] for a in info["tables"]["azimuthal survival"]["axes"]],
+                         ["sigma", "g", "absorption", "h"])
+        for other in (file, pack):
+            self.assertEqual(run("furtable", "verify", other)[0], 0, other)
+            energies = []
+            for absorption in (0, 0.3, 1.1, 2):
+                status, out, err = run("furtable", "query", other, "--table", "azimuthal", "--sigma", 1.2, "--g", 0.3,
+                                       "--h", -0.5, "--absorption", absorption, "--json")
+                self.assertEqual(status, 0, err)
+                lobe = json.loads(out)
+                energies.append(lobe["energy"])
+                self.assertEqual(lobe["absorption"], absorption)
+                self.assertAlmostEqual(sum(lobe["density"]) * 2 * math.pi / 72 / lobe["energy"], 1, delta=1e-2)
+            self.assertAlmostEqual(energies[0], 1 - math.exp(-2.4 * math.sqrt(0.75)), places=6)
+            self.assertEqual(energies, sorted(energies, reverse=True))
+            self.assertLess(energies[-1], 0.5 * energies[0])
+            self.fails(1, "furtable", "query", other, "--table", "azimuthal", "--sigma", 1.2, "--g", 0.3, "--h", 0.5,
+                       "--absorption", 2.5, names=["absorption", "2.5"])
+        errors = json.loads(run("furtable", "diff", file, pack, "--json")[1])["errors"]["azimuthal"]
+        self.assertLess(errors["relative_l2"], 0.02)
+        self.assertLess(errors["survival_error"], 2e-3)
+        # Without the axis: the same lobes at absorption 0, and no answer above it.
+        plain = json.loads(run("furtable", "diff", self.path("t.h5"), file, "--json")[1])["errors"]["azimuthal"]
+        self.assertEqual(plain["relative_l2"], 0)
+        self.fails(1, "furtable", "diff", file, self.path("t.h5"), names=["absorption"])
+        self.fails(1, "furtable", "query", "t.h5", "--table", "azimuthal", "--sigma", 1, "--g", 0.3, "--h", 0.5,
+                   "--absorption", 1, names=["absorption"])
+        self.fails(2, "furtable", "query", "t.h5", "--table", "longitudinal", "--sigma", 1, "--g", 0.3, "--theta", 10,
+                   "--absorption", 1)
+        self.fails(2, "medulla-precompute", "-o", self.path("never.h5"), "--table", "longitudinal",
+                   "--absorption-range", "0:1", names=["--absorption-range"])
+        self.assertEqual(run("furtable", "plot", file, pack, "-o", self.path("absorb.svg"))[0], 0)
+
+    def test_bcsdf_and_presets(self):
+        presets = json.loads(run("furtable", "presets", "--json")[1])["presets"]
+        self.assertEqual(len(presets), 10)
+        self.assertEqual(presets[0], {"name": "bobcat", "kappa": 0.88, "eta": 1.69, "alpha": 5.48, "beta_m": 11.64,
+                                      "beta_n": 7.49, "sigma_ca": 0.64, "sigma_ms": 1.69, "sigma_ma": 0.17, "g": 0.44,
+                                      "layers": 0.47})
+        text = run("furtable", "presets")[1].splitlines()
+        self.assertEqual([line.split()[0] for line in text[2:]], [p["name"] for p in presets])
+        where = ["--theta-i", 20, "--theta-r", -15, "--phi", 170]
+
+        def lobes(*words):
+            status, out, err = run("furtable", "bcsdf", *words, "--json")
+            self.assertEqual((status, err), (0, ""))
+            answer = json.loads(out)
+            self.assertEqual(list(answer["lobes"]), ["R", "TT", "TRT", "TTs", "TRTs"])
+            return answer
+
+        cat = lobes("--preset", "cat", *where, "--h", 0.3)
+        cosine = math.cos(math.radians(20))
+        for lobe in cat["lobes"].values():
+            self.assertAlmostEqual(lobe["value"], lobe["M"] * lobe["N"] / cosine ** 2, delta=1e-6 * (1 + lobe["value"]))
+        self.assertAlmostEqual(cat["sum"], sum(lobe["value"] for lobe in cat["lobes"].values()), places=9)
+        self.assertGreater(cat["lobes"]["TTs"]["value"], 0.01)
+        self.assertEqual(lobes("--preset", "cat", *where, "--h-range", "-1:1"), lobes("--preset", "cat", *where, "--far"))
+        self.assertEqual(lobes("--preset", "cat", *where, "--h-range", "0.3:0.3"), cat)
+        # The same from a material file, whose angles are degrees; three sigma_ca make arrays of three.
+        material = self.path("m.json")
+        with open(material, "w") as f:
+            json.dump({k: v for k, v in presets[1].items()}, f)
+        same = lobes("--material", material, *where, "--h", 0.3)
+        for name, lobe in same["lobes"].items():  # a degree to a radian is rounded once more
+            self.assertAlmostEqual(lobe["value"], cat["lobes"][name]["value"], delta=1e-5 * (1 + lobe["value"]))
+        with open(material, "w") as f:
+            json.dump({"preset": "cat", "sigma_ca": [0.06, 0.5, 2], "fresnel": "exact"}, f)
+        colour = lobes("--material", material, *where, "--h", 0.3)
+        self.assertEqual(len(colour["sum"]), 3)
+        self.assertGreater(colour["sum"][0], colour["sum"][1])
+        self.assertNotEqual(colour["lobes"]["TT"]["N"][0], cat["lobes"]["TT"]["N"])
+        rows = run("furtable", "bcsdf", "--preset", "cat", *where, "--h", 0.3)[1].splitlines()
+        self.assertEqual([row.split()[0] for row in rows], ["lobe", "R", "TT", "TRT", "TTs", "TRTs", "sum"])
+
+        self.fails(2, "furtable", "bcsdf", "--preset", "lion", *where, "--far", names=["--preset", "bobcat", "lion"])
+        self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, names=["--h"])
+        self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, "--h", 2, names=["--h", "[-1, 1]", "2"])
+        self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, "--h-range", "1:0", names=["--h-range", "1:0"])
+        self.fails(2, "furtable", "bcsdf", "--preset", "cat", "--theta-i", 91, *where[2:], "--far", names=["--theta-i"])
+        self.fails(1, "furtable", "bcsdf", "--material", "none.json", *where, "--far", names=["none.json"])
+        self.fails(1, "furtable", "bcsdf", "--preset", "cat", *where, "--far", "--pack", "none", names=["none"])
+        for field, value in (("eta", 0.5), ("fresnel", "none"), ("sigma_ca", [1, 2]), ("colour", 1), ("kappa", "big")):
+            with open(material, "w") as f:
+                json.dump({"preset": "cat", field: value}, f)
+            self.fails(1, "furtable", "bcsdf", "--material", material, *where, "--far", names=["m.json", field])
 
     def test_no_temporary_file_is_left(self):
         self.assertEqual([name for name in os.listdir(self.folder.name) if ".tmp" in name], [])

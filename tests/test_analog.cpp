@@ -1,6 +1,9 @@
 // The analog tracer against what is known in closed form (docs/physics.md, sections 2 to 4).
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstdint>
+#include <set>
+#include <vector>
 
 #include "sim2d/analog.hpp"
 
@@ -140,7 +143,7 @@ TEST_CASE("Walks end and stay finite at the ends of every range", "[analog][stre
     std::uint64_t cell = 0;
     for (const double sigma : {0.0, 5e-324, 1e-300, 1e-8, 1.0, 1e3})
         for (const double g : {-0.99, 0.0, 0.999})
-            for (const double h : {0.0, 1.0, 1 - 1e-7, -1.0}) {
+            for (const double h : {0.0, 5e-324, 1.0, 1 - 1e-7, -1.0}) {
                 const Profile p = trace_disc(sigma, g, h, 8, options(20, FirstCollision::forced, ++cell));
                 double sum = 0;
                 for (const double x : p.lobe) {
@@ -148,11 +151,13 @@ TEST_CASE("Walks end and stay finite at the ends of every range", "[analog][stre
                     sum += x * 2 * pi / 8;
                 }
                 CHECK(sum == Approx(1).epsilon(1e-12));
-                CHECK((std::isfinite(p.mean_length) && p.mean_length >= 0 && p.energy >= 0 && p.energy <= 1));
+                CHECK((std::isfinite(p.mean_length) && p.mean_length >= 0));
+                CHECK(p.energy ==
+                      Approx(-std::expm1(-2 * sigma * std::sqrt((1 - h) * (1 + h)))).epsilon(1e-12).margin(0));
             }
     for (const double sigma : {0.0, 5e-324, 1e-8, 1e3})
         for (const double g : {-0.99, 0.0, 0.999})
-            for (const double theta_i : {0.0, 89.99 * pi / 180, pi / 2}) {
+            for (const double theta_i : {0.0, 5e-324, 89.99 * pi / 180, pi / 2}) {
                 const SlabProfile p = trace_slab(sigma, g, theta_i, 8, options(20, FirstCollision::forced, ++cell));
                 CHECK((std::isfinite(p.back.energy) && std::isfinite(p.forward.energy)));
                 CHECK(p.back.energy + p.forward.energy ==
@@ -170,4 +175,34 @@ TEST_CASE("Walks end and stay finite at the ends of every range", "[analog][stre
     CHECK_THROWS(trace_disc(1, 1, 0, 8, {}));
     CHECK_THROWS(trace_disc(1, 0, 1.5, 8, {}));
     CHECK_THROWS(trace_disc(std::nan(""), 0, 0, 8, {}));
+}
+
+TEST_CASE("Random numbers do not repeat over 2^40 paths", "[analog][stress]") {
+    // Both ends of the 32 bits of a counter's word, the last path, and paths that differ in one bit only. 44 streams
+    // of 4096 numbers of 52 bits: two equal ones by chance once in 2.8 10^5 runs; here it is once and for all.
+    std::vector<std::uint64_t> paths{0, (1ull << 32) - 1, (1ull << 40) - 1, (1ull << 40) - 2};
+    for (int bit = 0; bit < 40; ++bit) paths.push_back(1ull << bit);
+    std::set<double> seen;
+    double sum = 0, squares = 0;
+    for (const std::uint64_t path : paths) {
+        RandomStream random(11, 5, path);
+        for (int i = 0; i < 4096; ++i) {
+            const double u = random.uniform();
+            seen.insert(u), sum += u, squares += u * u;
+        }
+    }
+    const double n = 4096.0 * static_cast<double>(paths.size());
+    CHECK(static_cast<double>(seen.size()) == n);
+    CHECK(std::abs(sum / n - 0.5) < 5 * std::sqrt(1 / 12.0 / n));
+    CHECK(std::abs(squares / n - 1 / 3.0) < 5 * std::sqrt(4 / 45.0 / n));
+    // Walks of the last paths end like those of the first: mean number of scatterings, 2 x 3000 walks, 5 errors.
+    double count[2] = {0, 0}, square = 0;
+    for (std::uint64_t i = 0; i < 3000; ++i)
+        for (const int end : {0, 1}) {
+            RandomStream random(11, 5, end ? (1ull << 40) - 1 - i : i);
+            const auto c = static_cast<double>(walk_disc({-1, 0, {1, 0}}, 20, 0.5, random).scatterings);
+            count[end] += c / 3000, square += c * c / 6000;
+        }
+    CHECK(count[0] != count[1]);
+    CHECK(std::abs(count[0] - count[1]) < 5 * std::sqrt(2 * square / 3000));
 }

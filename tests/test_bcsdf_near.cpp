@@ -120,6 +120,27 @@ TEST_CASE("kappa = 0 is exactly the hair model and reads no table", "[bcsdf]") {
     CHECK(total(near_lobes(lacking, 0.3f, -0.3f, 0.1f, 0.1f)) == 0);
 }
 
+TEST_CASE("any number of channels: each is what one channel gives alone", "[bcsdf]") {
+    constexpr FurParameters<7> seven = parameters_of<7>(*find_preset("deer"));
+    static_assert(seven.kappa == 0.91f && seven.sigma_ca[6] == 1.39f, "presets are constants");
+    FurParameters<7> p = seven;
+    for (int c = 0; c < 7; ++c) p.sigma_ca[c] = 0.3f * float(c * c);
+    FurFibre<7> all;
+    REQUIRE(prepare(p, pack().view, all) == FurStatus::ok);
+    for (int c = 0; c < 7; ++c) {
+        FurParameters<1> q = parameters_of<1>(*find_preset("deer"));
+        q.sigma_ca[0] = p.sigma_ca[c];
+        FurFibre<1> one;
+        REQUIRE(prepare(q, pack().view, one) == FurStatus::ok);
+        for (float phi : {0.2f, 2.9f}) {
+            CHECK(eval(all, 0.4f, -0.3f, phi, 0.1f).value[c] == eval(one, 0.4f, -0.3f, phi, 0.1f).value[0]);
+            // The far field skips scattered nodes by the brightest channel's energy.
+            CHECK(eval(all, 0.4f, -0.3f, phi, OffsetRange{}).value[c] ==
+                  Approx(eval(one, 0.4f, -0.3f, phi, OffsetRange{}).value[0]).epsilon(1e-6));
+        }
+    }
+}
+
 TEST_CASE("lobes integrate to their energies, and energies to at most 1", "[bcsdf]") {
     std::mt19937 random(2);
     std::uniform_real_distribution<float> u(0, 1);

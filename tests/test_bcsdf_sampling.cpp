@@ -8,6 +8,7 @@
 
 #include "analytic_pack.hpp"
 #include "medulla/medulla.hpp"
+#include "statistics.hpp"
 
 using namespace medulla;
 using analytic::AnalyticPack;
@@ -39,13 +40,6 @@ FurParameters<3> random_fur(Random& r, int i) {
     p.sigma_ms = 5 * r.uniform(), p.sigma_ma = r.uniform() * r.uniform(), p.sigma_ca[0] = r.uniform();
     p.g = 1.2f * r.uniform() - 0.6f;
     return p;
-}
-
-/// Upper tail of the chi-squared distribution by the Wilson-Hilferty cube root, good to 1e-3 in the tail used here for
-/// the hundred and more degrees of freedom of a grid.
-double chi_squared_tail(double statistic, double degrees) {
-    const double z = (std::cbrt(statistic / degrees) - 1 + 2 / (9 * degrees)) / std::sqrt(2 / (9 * degrees));
-    return 0.5 * std::erfc(z / std::sqrt(2.0));
 }
 
 constexpr int rows = 24, columns = 32;
@@ -85,7 +79,7 @@ double chi_squared(const std::vector<double>& share, const std::vector<int>& cou
         statistic += (counts[i] - e) * (counts[i] - e) / e, ++degrees;
     }
     if (pooled > 10) statistic += (seen - pooled) * (seen - pooled) / pooled, ++degrees;
-    return degrees > 0 ? chi_squared_tail(statistic, degrees) : 1;
+    return degrees > 0 ? test::chi_squared_tail(statistic, degrees) : 1;
 }
 
 struct Drawn {
@@ -97,15 +91,17 @@ struct Drawn {
 template <class Sampler>
 Drawn draw(const Sampler& sampler, Random& r, int samples) {
     Drawn d;
+    int invalid = 0;
     for (int s = 0; s < samples; ++s) {
         const FurSample<3> x = sampler.sample(r.numbers());
-        REQUIRE(x.valid);
+        invalid += !x.valid;
         const int i = std::min(rows - 1, int((double(x.theta_r) / pi + 0.5) * rows)),
                   j = std::min(columns - 1, std::max(0, int((double(x.phi) / pi + 1) / 2 * columns)));
         ++d.counts[std::size_t(std::max(0, i) * columns + j)];
         for (float w : x.weight) d.largest_weight = std::max(d.largest_weight, w);
         d.mean_weight += double(x.weight[0]) / samples;
     }
+    CHECK(invalid == 0);
     return d;
 }
 
@@ -160,12 +156,12 @@ TEST_CASE("near samples pass chi-squared with Sidak's correction, a broken pdf f
                 broken_caught, cases, double(largest));
 }
 
-TEST_CASE("far samples pass chi-squared", "[bcsdf]") {
+TEST_CASE("far and interval samples pass chi-squared, a broken pdf fails", "[bcsdf]") {
     const int cases = from_environment("MEDULLA_CHI_CASES", 4),
               samples = from_environment("MEDULLA_CHI_SAMPLES", 40000);
     const double level = 1 - std::pow(1 - 0.01, 1.0 / cases);
     Random r{std::mt19937_64(12)};
-    int passed = 0;
+    int passed = 0, broken_caught = 0;
     float largest = 0;
     for (int i = 0; i < cases; ++i) {
         const FurParameters<3> p = random_fur(r, i + 3);
@@ -184,10 +180,23 @@ TEST_CASE("far samples pass chi-squared", "[bcsdf]") {
             ++passed;
         else
             std::printf("far case %d: p-value %.2g\n", i, value);
+        // Broken: the density of inclinations 0.1 away, a tenth of the widest lobe.
+        const auto wrong = expected_shares([&](float t, float f) { return sampler.pdf_angular(t - 0.1f, f); }, 1);
+        if (!(chi_squared(wrong, d.counts, samples) > level)) ++broken_caught;
         largest = std::max(largest, d.largest_weight);
+        FarField<3> exact;
+        far_field(fibre, far.near.longitudinal.theta_i, {low, high}, exact, FarQuality::fine);
+        double energy = 0;
+        for (int j = 0; j < 256; ++j)
+            for (const auto& N : exact.lobes(0.0f, float(pi * (2 * (j + 0.5) / 256 - 1))).N)
+                energy += double(N[0]) * 2 * pi / 256;
+        CHECK(d.mean_weight == Approx(energy).margin(8 / std::sqrt(double(samples))));  // as for near
     }
     CHECK(passed == cases);
-    std::printf("far: %d of %d pass chi-squared, largest weight %.3f\n", passed, cases, double(largest));
+    CHECK(broken_caught == cases);
+    CHECK(largest < 3 * 1.5f);  // channels, and the scattered lobes' shifts about their mean
+    std::printf("far: %d of %d pass chi-squared, %d of %d broken ones caught, largest weight %.3f\n", passed, cases,
+                broken_caught, cases, double(largest));
 }
 
 TEST_CASE("truncated Gaussians are drawn as they are dense, also where the centre is outside", "[bcsdf]") {
@@ -211,28 +220,91 @@ TEST_CASE("truncated Gaussians are drawn as they are dense, also where the centr
         }
 }
 
-TEST_CASE("white furnace: near and far return their energies, never above 1", "[bcsdf]") {
+namespace {
+
+/// Integral over theta_r of one side of M^s, which is 1 and what its dips below 0, held at 0, add.
+double side_integral(const MaterialTable& table, const Contraction& contraction) {
+    constexpr int n = 2000;
+    double sum = 0;
+    for (int i = 0; i < n; ++i) sum += double(lobe(table, contraction, float(pi * ((i + 0.5) / n - 0.5)))) * pi / n;
+    return sum;
+}
+
+struct Furnace {
+    double whole = 0;   ///< integral of the density over all exits
+    double excess = 0;  ///< the part of it that dips of M^s add
+};
+
+/// All that leaves a white fibre: M of the unscattered lobes integrates to 1, M^s to a lerp of its sides'.
+template <class Field>
+Furnace furnace(const Field& field, const Longitudinal<3>& m, const FurFibre<3>& fibre, bool scattered) {
+    constexpr int n = 512;
+    const double back = scattered ? side_integral(fibre.back, m.back) : 1,
+                 forward = scattered ? side_integral(fibre.forward, m.forward) : 1;
+    Furnace f;
+    for (int j = 0; j < n; ++j) {
+        const double phi = pi * (2 * (j + 0.5) / n - 1), t = std::abs(phi) / pi;
+        const auto l = field.lobes(0.0f, float(phi));
+        const double M = (1 - t) * back + t * forward, N = double(l.N[3][0]) + double(l.N[4][0]);
+        f.whole += (double(l.N[0][0]) + double(l.N[1][0]) + double(l.N[2][0]) + N * M) * 2 * pi / n;
+        f.excess += N * (M - 1) * 2 * pi / n;
+    }
+    return f;
+}
+
+/// F + (1 - F)(1 - F^2 x^2) of docs/bcsdf.md, averaged over [-1, 1]: midpoints as in test_bcsdf_far.cpp.
+double white_energy(const FurFibre<3>& fibre, double theta_i, double h) {
+    const auto& p = fibre.parameters;
+    const auto at = inclination(double(p.eta), std::cos(theta_i), p.fresnel);
+    const auto path = trace(at, double(p.kappa), double(p.layers), h, std::sqrt((1 - h) * (1 + h)));
+    const double x = std::exp(-2 * path.s_m * double(p.sigma_ms) * at.inverse_cos_t), F = path.cuticle.F;
+    return F + path.cuticle.T_ * (1 - F * F * (fibre.scattered ? x * x : 0.0));
+}
+
+}  // namespace
+
+TEST_CASE("white furnace: near and far return what the model's energies say", "[bcsdf]") {
     Random r{std::mt19937_64(13)};
-    double least = 2, most = 0;
+    double least[2] = {2, 2}, most[2] = {}, off[2] = {}, excess = 0;
     for (int i = 0; i < from_environment("MEDULLA_FURNACE_CASES", 6); ++i) {
         FurParameters<3> p = random_fur(r, i);
         p.sigma_ma = p.sigma_ca[0] = p.sigma_ca[1] = p.sigma_ca[2] = 0;
-        p.beta_m = std::max(p.beta_m, 0.05f), p.beta_n = std::max(p.beta_n, 0.05f);
+        p.beta_n = std::max(p.beta_n, 0.05f), p.kappa = std::max(p.kappa, 0.01f);
+        if (i % 3 == 2) p.sigma_ms = 30 * r.uniform();  // dense: nothing is lost, the sum is 1
         FurFibre<3> fibre;
-        prepare(p, pack().view, fibre);
+        REQUIRE(prepare(p, pack().view, fibre) == FurStatus::ok);
+        const float theta_i = 3.0f * (r.uniform() - 0.5f), h = 2 * r.uniform() - 1;
+        NearField<3> near;
+        near_field(fibre, theta_i, h, near);
         FarField<3> far;
-        far_field(fibre, 3.0f * (r.uniform() - 0.5f), {-1, 1}, far);
-        // M and N factor but for M^s, linear in |phi|: its integral over theta_r is 1 at every phi.
-        double sum = 0;
-        for (int j = 0; j < 128; ++j) {
-            const auto l = far.lobes(0.0f, float(pi * (2 * (j + 0.5) / 128 - 1)));
-            for (int k = 0; k < lobe_count; ++k) sum += double(l.N[k][0]) * 2 * pi / 128;
+        far_field(fibre, theta_i, {-1, 1}, far);
+        double mean_energy = 0;
+        const double rim = std::asin(double(far.rim)), cut[4] = {-pi / 2, -rim, rim, pi / 2};
+        for (int piece = 0; piece < 3; ++piece)
+            for (int j = 0; j < 200; ++j) {
+                const double t = pi * (j + 0.5) / 200, a = cut[piece], b = cut[piece + 1];
+                const double gamma = a + (b - a) * (1 - std::cos(t)) / 2;
+                mean_energy += white_energy(fibre, double(theta_i), std::sin(gamma)) * std::cos(gamma) * (b - a) / 4 *
+                               std::sin(t) * pi / 200;
+            }
+        const Furnace whole[2] = {furnace(near, near.longitudinal, fibre, near.scattered),
+                                  furnace(far, far.near.longitudinal, fibre, far.nodes > 0)};
+        const double energy[2] = {white_energy(fibre, double(theta_i), double(h)), mean_energy};
+        // Near: float, and lobes that carry less than 2^-24. Far: the quadrature's own error, 3e-4 a lobe and, of R as
+        // it is alone at the rim, 1.2e-3 at most.
+        const double above[2] = {2e-6, 5e-4}, below[2] = {2e-6, 2e-3};
+        for (int k = 0; k < 2; ++k) {
+            least[k] = std::min(least[k], whole[k].whole), most[k] = std::max(most[k], whole[k].whole);
+            const double plain = whole[k].whole - whole[k].excess;
+            off[k] = std::max(off[k], std::abs(plain - energy[k])), excess = std::max(excess, whole[k].excess);
+            INFO("case " << i << (k ? " far" : " near"));
+            CHECK(plain <= energy[k] + above[k]);
+            CHECK(plain >= energy[k] - below[k]);
+            CHECK(energy[k] <= 1 + 1e-12);
         }
-        least = std::min(least, sum), most = std::max(most, sum);
-        CHECK(sum <= 1.001);  // the far field's own error
-        CHECK(sum >= 0.7);
     }
-    std::printf("white furnace, far field: %.4f to %.4f\n", least, most);
+    std::printf("white furnace: near %.6f to %.6f, %.1e off; far %.6f to %.6f, %.1e off; dips of C^M add up to %.1e\n",
+                least[0], most[0], off[0], least[1], most[1], off[1], excess);
 }
 
 TEST_CASE("directions, offsets and coverage", "[bcsdf]") {
@@ -255,6 +327,23 @@ TEST_CASE("directions, offsets and coverage", "[bcsdf]") {
     const auto here = near_lobes(fibre, 0.0f, 0.0f, -2 * std::asin(0.5f), 0.5f),
                there = near_lobes(fibre, 0.0f, 0.0f, 2 * std::asin(0.5f), 0.5f);
     CHECK(here.N[0][0] > 1e3f * there.N[0][0]);
+    // What a sampler draws, as directions: the same density, and the direction's own angles.
+    NearField<3> near;
+    near_field(fibre, std::asin(0.6f), -0.3f, near);
+    NearSampler<3> sampler;
+    sampler.prepare(near);
+    const Vector<float> omega_i = {0.6f, 0.48f, 0.64f};
+    Random r{std::mt19937_64(14)};
+    for (int i = 0; i < 100; ++i) {
+        const FurSample<3> s = sampler.sample(r.numbers());
+        const Vector<float> omega_r = direction_of(s, omega_i);
+        CHECK(omega_r.x == Approx(std::sin(s.theta_r)).margin(1e-6));
+        CHECK(pdf(sampler, omega_i, omega_r) ==
+              Approx(s.pdf).epsilon(2e-3));  // 1e-6 of angle over beta_n 0.065, beta_m
+        const Colour<3> S = eval(fibre, omega_i, omega_r, -0.3f);
+        // sum M N / cos theta_r = S cos^2 theta_i / cos theta_r, per steradian, over the pdf.
+        CHECK(S.value[0] * 0.8f * 0.8f / std::cos(s.theta_r) / s.pdf == Approx(s.weight[0]).epsilon(4e-3));
+    }
     const auto value = eval(fibre, Vector<float>{0.6f, 0.8f, 0}, Vector<float>{-0.6f, 0, 0.8f}, -0.3f);
     CHECK(value.value[1] ==
           Approx(eval(fibre, std::asin(0.6f), -std::asin(0.6f), float(pi / 2), -0.3f).value[1]).epsilon(1e-4));

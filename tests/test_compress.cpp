@@ -2,6 +2,8 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include "medulla/default_pack.hpp"
+#include "medulla/held_integral.hpp"
 #include "medulla/lookup.hpp"
 #include "tables/axis.hpp"
 #include "tables/compress.hpp"
@@ -125,4 +127,78 @@ TEST_CASE("Non-negative factors: every component is a density between the nodes 
         }
     }
     for (const LobeError& error : result.errors) CHECK(error.relative < 0.4);
+}
+
+TEST_CASE("With its dips counted, a lobe integrates to 1 to float precision", "[compress]") {
+    CompressOptions options;
+    options.rank = 4;  // coarse: it dips a lot
+    const Opened coarse(compress(small_tables(), options, "test").pack);
+    const OpenResult opened = open_pack(default_pack_words, default_pack_size);
+    REQUIRE(opened.status == PackStatus::ok);
+    double deepest = 0, worst = 0;
+    for (const PackView* pack : {&coarse.view, &opened.pack})
+        for (const TableKind kind : lobe_kinds)
+            for (int i = 0; i < 60; ++i) {
+                const TableView& table = (*pack)[kind];
+                const float u = static_cast<float>(i) / 60;
+                LobeQuery query;
+                query.sigma = 4 * u * u, query.g = 0.7f * (1 - std::abs(2 * u - 1)), query.h = u,
+                query.theta_i = 1.5f * u;
+                Contraction contraction = contract(table, query);
+                hold_energy(table, contraction);
+                // Simpson's rule on 64 parts of every span: a kink at a dip's end is off by its slope / 64^2.
+                const AxisView<float> axis = table.axis(table.parameter_axes());
+                double integral = 0, least = 0;
+                for (std::uint32_t span = 0; span < axis.spans; ++span) {
+                    const auto a = static_cast<double>(axis.breakpoint(static_cast<std::int32_t>(span))),
+                               b = static_cast<double>(axis.breakpoint(static_cast<std::int32_t>(span) + 1));
+                    constexpr int parts = 64;
+                    for (int p = 0; p <= 2 * parts; ++p)
+                        for (const double side : {-1.0, 1.0}) {
+                            const auto y = static_cast<float>(side * (a + (b - a) * p / (2 * parts)));
+                            const double weight = p % (2 * parts) == 0 ? 1 : (p % 2 ? 4 : 2);
+                            integral +=
+                                weight * (b - a) / (6 * parts) * static_cast<double>(lobe(table, contraction, y));
+                            least = std::min(least, static_cast<double>(signed_lobe(table, contraction, y)));
+                        }
+                }
+                deepest = std::min(deepest, least);
+                worst = std::max(worst, std::abs(integral - 1));
+            }
+    CHECK(deepest < -1e-3);  // there was something to hold
+    CHECK(worst < 5e-6);     // float sums of up to 280 components that cancel up to tenfold
+}
+
+TEST_CASE("Degeneracy is found again from a pack's bytes", "[compress]") {
+    CompressOptions options;
+    options.rank = 8;
+    const CompressResult result = compress(small_tables(), options, "test");
+    REQUIRE(result.degeneracy.size() == 4);
+    for (std::size_t i = 0; i < 3; ++i) {
+        // Even and odd components are orthogonal, and the solver worked in the same inner product but for bins and
+        // 12-bit rounding.
+        double sum = 0, least = 1;
+        for (std::size_t p = 0; p < result.tables[i].parts.size(); ++p) {
+            const PartReport& part = result.tables[i].parts[p];
+            least = std::min(least, part.solve.degeneracy.least_cosine);
+            sum += part.solve.degeneracy.norm_ratio * part.share;
+        }
+        CHECK(result.degeneracy[i].first == result.tables[i].kind);
+        CHECK(result.degeneracy[i].second.norm_ratio == Approx(sum).epsilon(0.02));
+        CHECK(result.degeneracy[i].second.least_cosine == Approx(least).margin(0.02));
+    }
+}
+
+TEST_CASE("No error is claimed below the noise of the table", "[compress]") {
+    Tables noisy = small_tables();
+    for (double& error : noisy.azimuthal->standard_error) error = 0.05;
+    CompressOptions options;
+    options.rank = 8;
+    const CompressResult result = compress(noisy, options, "test");
+    CHECK(result.errors[0].relative < 0.05);
+    CHECK(result.errors[0].noise == Approx(0.05).epsilon(1e-12));
+    CHECK(result.errors[0].claim > 0.05);
+    CHECK(result.errors[0].worst_claim >= result.errors[0].claim);
+    // The pack carries the noise along.
+    CHECK(pack_source(result.pack, "test")->noise(TableKind::azimuthal, {}) == Approx(0.05).epsilon(1e-6));
 }

@@ -79,6 +79,13 @@ TEST_CASE("Portable elementary functions are right to an ulp", "[elementary]") {
         angle.see(ulps(portable::atan2(y, x), atan2l(y, x)));
     }
     CHECK(angle.ulp < 2);  // fdlibm's atan is below 1, the quotient adds 1/2
+    // Their argument is off by 3/2 units (two differences, a product, a root), and so is the angle at most.
+    const auto asin = [](double x) { return portable::asin(x); };
+    const auto acos = [](double x) { return portable::acos(x); };
+    CHECK(worst(asin, asinl, between(-1, 1)) < 4);
+    CHECK(worst(asin, asinl, powers(-1000, 0)) < 4);
+    CHECK(worst(acos, acosl, between(-1, 1)) < 4);
+    CHECK(worst(acos, acosl, between(1 - 1e-9, 1)) < 4);
 }
 
 TEST_CASE("Portable elementary functions at the ends of their ranges", "[elementary]") {
@@ -100,6 +107,10 @@ TEST_CASE("Portable elementary functions at the ends of their ranges", "[element
     CHECK(portable::sin(0) == 0);
     CHECK(portable::cos(0) == 1);
     CHECK(portable::sin(pi / 2) == 1);
+    CHECK(portable::asin(0) == 0);
+    CHECK(portable::acos(1) == 0);
+    CHECK(portable::asin(1) == std::asin(1.0));
+    CHECK(portable::acos(-1) == std::acos(-1.0));
     for (const double y : {0.0, -0.0, 1.0, -1.0})
         for (const double x : {0.0, -0.0, 1.0, -1.0}) {
             CAPTURE(y, x);

@@ -261,10 +261,17 @@ TEST_CASE("slab stays finite and non-negative at the ends of its ranges", "[slab
         options.max_directions = 160;  // unresolved on purpose
         const SlabSolver solver(g, options);
         CHECK_FALSE(solver.resolved());
-        for (double sigma : {5e-324, 1e-300, 1e-8, 0.1, 30.0, 1e3}) {
-            for (const auto& profile : solver.solve(sigma, {0, 0.8, 89.99 * kPi / 180, kHalfPi})) {
+        for (double sigma : {0.0, 5e-324, 1e-300, 1e-8, 0.1, 30.0, 1e3}) {
+            const std::vector<double> theta{0, 5e-324, 0.8, 89.99 * kPi / 180, kHalfPi, -kHalfPi};
+            const auto profiles = solver.solve(sigma, theta);
+            for (std::size_t i = 0; i < theta.size(); ++i) {
+                CAPTURE(g, sigma, theta[i]);
+                const auto& profile = profiles[i];
                 check_profile(profile.back);
                 check_profile(profile.forward);
+                // A product and a sum of rounded values; slab_energy itself is held against expm1 elsewhere.
+                CHECK(profile.back.energy + profile.forward.energy ==
+                      Approx(slab_energy(sigma, theta[i])).epsilon(1e-12).margin(0));
             }
         }
     }

@@ -1,7 +1,11 @@
 // The fast tracer against its analog twin, the deterministic solvers and closed forms (docs/physics.md, 2 to 4).
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <numeric>
+#include <set>
+#include <string>
 #include <thread>
 
 #include "sim2d/analog.hpp"
@@ -265,7 +269,7 @@ TEST_CASE("The tracer holds at the ends of every range", "[tracer][stress]") {
     TracerOptions o = options(1);  // one path: sixteen, one per randomisation
     for (const double sigma : {0.0, 5e-324, 1e-300, 1e-38, 1e-8, 1.0, 1e3})
         for (const double g : {-0.99, 0.0, 0.999}) {
-            for (const double h : {0.0, 1.0, 1 - 1e-7, -1.0}) {
+            for (const double h : {0.0, 5e-324, 1.0, 1 - 1e-7, -1.0}) {
                 ++o.cell;
                 INFO("sigma " << sigma << " g " << g << " h " << h);
                 const auto t = trace_expected_disc(sigma, g, h, 24, o);
@@ -274,7 +278,7 @@ TEST_CASE("The tracer holds at the ends of every range", "[tracer][stress]") {
                 CHECK(t.profile.energy == disc_energy(sigma, h));
                 CHECK((std::isfinite(t.profile.mean_length) && t.profile.mean_length >= 0));
             }
-            for (const double theta : {0.0, 89.99 * pi / 180, pi / 2, -pi / 2}) {
+            for (const double theta : {0.0, 5e-324, 89.99 * pi / 180, pi / 2, -pi / 2}) {
                 ++o.cell;
                 INFO("sigma " << sigma << " g " << g << " theta " << theta);
                 const auto t = trace_expected_slab(sigma, g, theta, 12, o);
@@ -301,6 +305,134 @@ TEST_CASE("The tracer holds at the ends of every range", "[tracer][stress]") {
     CHECK_THROWS_AS(trace_expected_slab(1, 0, 2, 8, {}), std::invalid_argument);
     CHECK_THROWS_AS(trace_expected_slab(1, 0, 0, 0, {}), std::invalid_argument);
     CHECK_THROWS_AS(trace_expected_slab(1, 0, 0, 8, options(0)), std::invalid_argument);
+}
+
+TEST_CASE("Walks with absorption: the deterministic solver's lobes, energies and lengths by z-scores",
+          "[tracer][absorption]") {
+    // As above: E[true error^2 - standard error^2] = 0 over independent repetitions, at 5 of its own standard errors,
+    // for lobes and energies. Means over the repetitions at 5 of their standard errors; energies of the reference keep
+    // 2e-4, its lengths 1e-3 and 3e-5 over the share of collided light that leaves (sim2d/disc_deterministic.hpp).
+    const std::vector<double> absorption{0.0, 0.1, 1.0, 6.0}, h{0.0, 0.55, 0.97};
+    for (const double g : {0.0, 0.6, 0.95}) {
+        const DiscSolver solver(g);
+        for (const double sigma : {0.05, 0.7, 8.0}) {
+            std::vector<std::vector<Profile>> exact;
+            for (const double a : absorption) exact.push_back(solver.solve(sigma, a, h, 360));
+            for (std::size_t i = 0; i < h.size(); ++i) {
+                std::vector<std::vector<double>> lobe(4), energy(4), excess(4), length(4);
+                bool falls = true;
+                for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+                    const auto found = trace_expected_disc(sigma, g, h[i], absorption, 360, options(512, seed)).profile;
+                    for (std::size_t j = 0; j < 4; ++j) {
+                        const Profile &p = found[j], &truth = exact[j][i];
+                        const double e = p.standard_error, miss = p.energy - truth.energy;
+                        lobe[j].push_back(distance2(p.lobe, truth.lobe) - e * e);
+                        energy[j].push_back(p.energy), length[j].push_back(p.mean_length);
+                        excess[j].push_back(miss * miss - p.energy_error * p.energy_error);
+                        // The same walks: less is left, and what is left went the shorter ways.
+                        if (j > 0) falls = falls && p.energy < found[j - 1].energy;
+                    }
+                }
+                CHECK(falls);
+                for (std::size_t j = 0; j < 4; ++j) {
+                    const Profile& truth = exact[j][i];
+                    const double extinction = sigma + absorption[j];
+                    const double leaves = truth.energy / (disc_energy(extinction, h[i]) * sigma / extinction);
+                    const Moments m = moments(lobe[j]), e = moments(energy[j]), x = moments(excess[j]),
+                                  l = moments(length[j]);
+                    INFO("sigma " << sigma << " g " << g << " h " << h[i] << " absorption " << absorption[j]);
+                    INFO("lobe excess " << m.mean << " +- " << m.error << ", energy excess " << x.mean << " +- "
+                                        << x.error);
+                    INFO("energy " << e.mean << " +- " << e.error << " true " << truth.energy << " length " << l.mean
+                                   << " +- " << l.error << " true " << truth.mean_length);
+                    CHECK(std::abs(m.mean) < 5 * m.error + 4e-6 + 4 * truth.standard_error * truth.standard_error);
+                    CHECK(std::abs(e.mean - truth.energy) < 5 * e.error + 2e-4 * truth.energy);
+                    CHECK(std::abs(x.mean) < 5 * x.error + 4e-8 * truth.energy * truth.energy);
+                    CHECK(std::abs(l.mean - truth.mean_length) <
+                          5 * l.error + 1e-3 * truth.mean_length + 3e-5 / leaves);
+                }
+            }
+        }
+    }
+}
+
+TEST_CASE("Walks without absorption in the list are those of the plain tracer, byte for byte", "[tracer][absorption]") {
+    for (const double sigma : {0.0, 1e-8, 3.0}) {
+        const Traced<Profile> plain = trace_expected_disc(sigma, 0.8, 0.4, 96, options(2048));
+        const auto all = trace_expected_disc(sigma, 0.8, 0.4, {1.5, 0.0, 200.0}, 96, options(2048));
+        CHECK(all.scatterings == plain.scatterings);
+        CHECK(all.profile[1].lobe == plain.profile.lobe);
+        CHECK(all.profile[1].standard_error == plain.profile.standard_error);
+        CHECK(all.profile[1].energy == plain.profile.energy);
+        CHECK(all.profile[1].mean_length == plain.profile.mean_length);
+        // An empty disc: what is scattered once is closed form, and all there is.
+        if (sigma < 1e-6)
+            for (const std::size_t j : {0u, 2u}) {
+                const double a = j == 0 ? 1.5 : 200;
+                const std::vector<double> lobe = disc_single_lobe(a, 0.8, 0.4, 96);
+                const double share = sum(lobe) * 2 * pi / 96;
+                for (std::size_t b = 0; b < 96; ++b)
+                    CHECK(all.profile[j].lobe[b] == Approx(lobe[b] / share).epsilon(1e-5).margin(1e-12));
+                CHECK(all.profile[j].mean_length == Approx(disc_single_length(a, 0.8, 0.4) / share).epsilon(1e-5));
+            }
+    }
+    CHECK_THROWS_AS(trace_expected_disc(1, 0, 0, {-1.0}, 8, {}), std::invalid_argument);
+    CHECK_THROWS_AS(trace_disc(1, 0, 0, {std::nan("")}, 8, {}), std::invalid_argument);
+}
+
+TEST_CASE("Every instruction set follows the same walks", "[tracer]") {
+    struct Restore {
+        ~Restore() { set_tracer_target(""); }
+    } restore;
+    REQUIRE(!tracer_targets().empty());
+    CHECK_THROWS_AS(set_tracer_target("no such"), std::invalid_argument);
+    CHECK(tracer_targets().front() == tracer_target());
+    std::vector<Profile> discs, backs;
+    for (const std::string& target : tracer_targets()) {
+        set_tracer_target(target);
+        CHECK(target == tracer_target());
+        discs.push_back(trace_expected_disc(3, 0.8, 0.3, 120, options(4096)).profile);
+        backs.push_back(trace_expected_slab(3, 0.8, 0.3, 60, options(4096)).profile.back);
+    }
+    // The same random numbers, other roundings: walks part where a float's 1e-7 decides, which is one in 10^4 of some
+    // ten decisions each; so their difference is 1e-2 of two independent runs', a tenth is far out.
+    for (std::size_t t = 1; t < discs.size(); ++t) {
+        INFO(tracer_targets()[t] << ", difference over standard error "
+                                 << std::sqrt(distance2(discs[t].lobe, discs[0].lobe)) / discs[0].standard_error);
+        CHECK(std::sqrt(distance2(discs[t].lobe, discs[0].lobe)) < 0.1 * discs[0].standard_error);
+        CHECK(std::sqrt(distance2(backs[t].lobe, backs[0].lobe)) < 0.1 * backs[0].standard_error);
+    }
+}
+
+TEST_CASE("The last walks of seed space are as good as the first, and others", "[tracer][stress]") {
+    // 2^8 randomisations of 2^32 walks: the 2^40 paths of a cell.
+    TracerCell cell;
+    cell.sigma = 3, cell.g = 0.5, cell.h = 0.3, cell.bins = 24;
+    cell.plan = plan_of(cell);
+    const std::uint64_t walks = 2048, last = (std::uint64_t{1} << 32) - walks;
+    WalkTracer tracer(cell);
+    std::vector<double> total[2];
+    std::vector<std::vector<double>> bins[2];
+    for (std::uint32_t r = 0; r < 24; ++r)
+        for (const int end : {0, 1}) {
+            TracerSums sums;
+            tracer.trace(end ? 255 - r : r, end ? last : 0, walks, sums);
+            REQUIRE(sums.walks == walks);
+            for (const double x : sums.bins) REQUIRE((std::isfinite(x) && x >= 0));
+            total[end].push_back(sum(sums.bins)), bins[end].push_back(sums.bins);
+        }
+    for (std::size_t r = 0; r < 24; ++r)
+        for (std::size_t q = 0; q < 24; ++q) CHECK(bins[0][r] != bins[1][q]);
+    // t of 23 degrees: 6 is once in 10^5.
+    const Moments a = moments(total[0]), b = moments(total[1]);
+    CHECK(std::abs(a.mean - b.mean) < 6 * std::hypot(a.error, b.error));
+    // Consecutive blocks and the two ends: no word of a walk's first scatterings comes twice.
+    std::set<std::array<std::uint32_t, 4>> seen;
+    for (const std::uint32_t randomisation : {0u, 1u, 254u, 255u})
+        for (const std::uint32_t order : {1u, 2u, 0xFFFFFEu})
+            for (const std::uint32_t first : {0u, 0x7FFFFF00u, 0xFFFFFE00u})
+                for (const auto& words : tracer_words(cell, order, randomisation, first, 512)) seen.insert(words);
+    CHECK(seen.size() == 4 * 3 * 3 * 512);
 }
 
 }  // namespace

@@ -111,17 +111,20 @@ struct Absorption {
     T medulla_extinction;  ///< (sigma_ma + sigma_ms) / cos theta_t
     T medulla_scattering;  ///< sigma_ms / cos theta_t
     T cortex[Channels];    ///< sigma_ca / cos theta_t
-    T T_b[Channels];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t)
+    T T_b[Channels];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
 };
 
+/// @param tabled the tables know what the medulla absorbs of scattered light: T_b leaves it out
 template <int Channels, class T>
-MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, T>& p, T inverse_cos_t) noexcept {
+MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, T>& p, T inverse_cos_t,
+                                              bool tabled = false) noexcept {
     Absorption<Channels, T> a;
+    const T medulla = tabled ? T(0) : p.kappa * p.sigma_ma * inverse_cos_t;
     a.medulla_extinction = (p.sigma_ma + p.sigma_ms) * inverse_cos_t;
     a.medulla_scattering = p.sigma_ms * inverse_cos_t;
     for (int c = 0; c < Channels; ++c) {
         a.cortex[c] = p.sigma_ca[c] * inverse_cos_t;
-        a.T_b[c] = real_math::exponential(-(p.kappa * p.sigma_ma * inverse_cos_t + (T(1) - p.kappa) * a.cortex[c]));
+        a.T_b[c] = real_math::exponential(-(medulla + (T(1) - p.kappa) * a.cortex[c]));
     }
     return a;
 }

@@ -68,7 +68,7 @@ struct FarField {
     int nodes = 0;                        ///< scattering nodes
     ScatteringNode<Channels> node[most_scattering_nodes];
     Four sigma_point;              ///< where sigma lies in unfolded tables, if the fibre has them
-    float sigma_weight[max_rank];  ///< else the azimuthal table contracted to it
+    float sigma_weight[max_rank];  ///< else the azimuthal table contracted to it and to the absorption
 
     MEDULLA_FN const FurFibre<Channels>& fibre() const noexcept { return *near.fibre; }
     MEDULLA_FN LobeValues<Channels> lobes(float theta_r, float phi) const noexcept;
@@ -88,8 +88,8 @@ struct Offset {
 template <class T>
 MEDULLA_FN Offset<T> offset_inside(float rim, T psi) noexcept {
     const auto sc = real_math::sine_cosine(psi);
-    const T h = T(rim) * sc.sine;
-    return {h, square_root((T(1.0f) - h) * (T(1.0f) + h)), T(rim) * sc.cosine};
+    const T along = T(rim) * sc.cosine;  // 1 - h^2 without a difference that rounding could make negative
+    return {T(rim) * sc.sine, square_root(T((1 - rim) * (1 + rim)) + along * along), along};
 }
 template <class T>
 MEDULLA_FN Offset<T> offset_at_angle(T gamma) noexcept {
@@ -250,7 +250,7 @@ MEDULLA_FN float place_panel(FarField<Channels>& far, float a, float b, GaussRul
     for (int j = 0; 2 * j < rule.half && far.nodes + 4 <= most_scattering_nodes; ++j) {
         const Offset<Four> at = offset_inside(far.rim, rule_nodes(rule, j, middle, half));
         const Path<Four> path = trace(m.at, parameters.kappa, parameters.layers, at.h, at.cos_i);
-        const Energies<Channels, Four> e = energies(path, m.absorption, true);
+        const Energies<Channels, Four> e = energies_at(far.fibre(), m, path, true);
         const Four weight = rule_weights(rule, j) * Four(half * far.inverse_width) * at.dh;
         const Four offset = magnitude(path.h_inside) * Four(1 / parameters.kappa);
         Four sum, share[2], centre[2];
@@ -278,7 +278,8 @@ MEDULLA_FN float place_panel(FarField<Channels>& far, float a, float b, GaussRul
 }
 
 /// Nodes of the scattered lobes: 8 over psi for either side of an ordinary medulla, more where g makes the lobe narrow
-/// against its shift; in a dense medulla TRTs lives within 1 / tau of the rim in psi, which then has panels of its own.
+/// against its shift; in a dense medulla, or where F rises at the rim alone, TRTs lives near the rim in psi, which then
+/// has panels of its own.
 template <int Channels>
 MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
     const FurParameters<Channels>& parameters = far.fibre().parameters;
@@ -290,9 +291,13 @@ MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
     const int index = (width > 0.1f ? 0 : 1) + far.quality;
     const GaussRule rule = gauss_rule(index < 0 ? 0 : index), edge = gauss_rule(1);
     const float tau = far.near.longitudinal.absorption.medulla_extinction * parameters.kappa;
+    // Where the medulla reaches the fibre's rim, F rises to 1 within cos gamma_i ~ sqrt(eta'^2 - 1), times few layers.
+    const float steep = std::sqrt(far.near.longitudinal.at.index_excess) * std::fmin(1.0f, 2 * parameters.layers);
+    const float rise = far.rim < 1 ? 4.0f : std::fmax(3 * steep, 0.01f), dense = tau > 4 ? 4 / tau : 4.0f;
+    const float edge_width = std::fmin(rise, dense);
     float most = 0, low = a, high = b;
-    if (tau > 4) {
-        const float rim = float(pi / 2) - 4 / tau;
+    if (edge_width < 1) {
+        const float rim = float(pi / 2) - edge_width;
         if (a < -rim) low = b < -rim ? b : -rim, most = place_panel(far, a, low, edge);
         if (b > rim && b > low) high = low > rim ? low : rim, most = std::fmax(most, place_panel(far, high, b, edge));
     }
@@ -345,11 +350,12 @@ MEDULLA_FN void far_field(const FurFibre<Channels>& fibre, float theta_i, Offset
     detail::place_cuts(far);
     if (!fibre.scattered) return;
     const float sigma = far.near.longitudinal.sigma;
-    if (fibre.tables != nullptr)
+    if (fibre.tables != nullptr) {
         far.sigma_point = fibre.tables->sigma_at(sigma);
-    else
-        contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, sigma, fibre.azimuthal.weight,
-                      far.sigma_weight);
+    } else {
+        const float* weight = weights_at(fibre.azimuthal, far.near.longitudinal.absorbed, far.sigma_weight);
+        contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, sigma, weight, far.sigma_weight);
+    }
     detail::place_scattering_nodes(far);
 }
 

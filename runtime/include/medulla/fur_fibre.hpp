@@ -15,16 +15,19 @@
 
 namespace medulla {
 
-/// A table with the axes contracted that a material fixes: g, and absorption at 0 (Eq. 20 has it in T_b).
+/// A table with the axes contracted that a material fixes: g, and absorption at 0 unless the pack knows what it leaves.
 struct MaterialTable {
     TableView view;
     std::uint32_t sigma_axis = 0, last_axis = 0;  ///< the two axes left: sigma, and h or theta_i
+    std::uint32_t absorption_axis = 0;            ///< a third one between them; 0: none
     AxisIndex<float> sigma_index = {}, last_index = {}, exit_index = {};
     alignas(32) float weight[max_rank] = {};  ///< [0, rank_stride) is set
 };
 
-MEDULLA_FN void prepare_table(const TableView& view, float g, MaterialTable& table) noexcept {
+MEDULLA_FN void prepare_table(const TableView& view, float g, MaterialTable& table,
+                              bool keep_absorption = false) noexcept {
     table.view = view;
+    table.absorption_axis = 0;
     start_contraction(view, table.weight);
     for (std::uint32_t k = 0; k < view.parameter_axes(); ++k) {
         switch (static_cast<Quantity>(view.layout.axes[k].quantity)) {
@@ -35,7 +38,10 @@ MEDULLA_FN void prepare_table(const TableView& view, float g, MaterialTable& tab
                 contract_axis(view, k, g, table.weight, table.weight);
                 break;
             case Quantity::absorption:
-                contract_axis(view, k, 0.0f, table.weight, table.weight);
+                if (keep_absorption)
+                    table.absorption_axis = k;
+                else
+                    contract_axis(view, k, 0.0f, table.weight, table.weight);
                 break;
             default:
                 table.last_axis = k;
@@ -62,12 +68,23 @@ MEDULLA_FN float lobe(const MaterialTable& table, const Contraction& contraction
     return value < 0 ? 0.0f : value;
 }
 
+/// The weights of a table at an absorption [optical radius], where it has kept that axis: in `room`, or its own.
+MEDULLA_FN const float* weights_at(const MaterialTable& table, float absorption, float* room) noexcept {
+    if (table.absorption_axis == 0) return table.weight;
+    contract_axis(table.view, table.absorption_axis, absorption, table.weight, room);
+    return room;
+}
+
 /// The lobe that is left at (sigma, h or theta_i).
-MEDULLA_FN void contract(const MaterialTable& table, const AxisPoint& sigma, const AxisPoint& last,
+MEDULLA_FN void contract(const MaterialTable& table, const float* weight, const AxisPoint& sigma, const AxisPoint& last,
                          Contraction& result) noexcept {
-    contract_axis(table.view, table.sigma_axis, sigma, table.weight, result.weight);
+    contract_axis(table.view, table.sigma_axis, sigma, weight, result.weight);
     contract_axis(table.view, table.last_axis, last, result.weight, result.weight);
     result.inverse_integral = inverse_integral(table.view, result.weight);
+}
+MEDULLA_FN void contract(const MaterialTable& table, const AxisPoint& sigma, const AxisPoint& last,
+                         Contraction& result) noexcept {
+    contract(table, table.weight, sigma, last, result);
 }
 MEDULLA_FN void contract(const MaterialTable& table, float sigma, float last, Contraction& result) noexcept {
     contract(table, sigma_point(table, sigma), last_point(table, last), result);
@@ -93,6 +110,7 @@ struct FurFibre {
     WrappedGaussian<float> azimuthal_gaussian[3] = {};  ///< variance (p + 1) beta_n^2 (Eq. 16)
     MaterialTable azimuthal, back, forward;
     bool paired = false;                     ///< whether `back` and `forward` have the same axes
+    TableView survival;                      ///< where the pack knows what the medulla's absorption leaves
     const UnfoldedTables* tables = nullptr;  ///< set by `unfold`: read instead of the factors
 };
 
@@ -102,6 +120,7 @@ MEDULLA_FN FurStatus prepare(const FurParameters<Channels>& p, const PackView& p
                              FurFibre<Channels>& fibre) noexcept {
     fibre.parameters = p;
     fibre.scattered = false;
+    fibre.survival = {};
     fibre.tables = nullptr;
     fibre.status = check(p);
     if (!usable(fibre.status)) return fibre.status;
@@ -117,7 +136,8 @@ MEDULLA_FN FurStatus prepare(const FurParameters<Channels>& p, const PackView& p
     const TableView& forward = pack[TableKind::longitudinal_forward];
     if (!azimuthal) return fibre.status = FurStatus::no_azimuthal_table;
     if (!back || !forward) return fibre.status = FurStatus::no_longitudinal_table;
-    prepare_table(azimuthal, p.g, fibre.azimuthal);
+    if (absorbs(pack)) fibre.survival = pack[TableKind::survival];
+    prepare_table(azimuthal, p.g, fibre.azimuthal, absorbs(pack));
     prepare_table(back, p.g, fibre.back);
     prepare_table(forward, p.g, fibre.forward);
     fibre.paired = true;
@@ -132,11 +152,12 @@ inline constexpr float widest_root_range = 1.4f;
 
 /// Multiplies the material's tables out into `tables`, which `fibre` then reads instead of the factors; takes about
 /// 1 ms with the default pack. false, and nothing is changed for the fibre, where they do not fit: longer or fewer than
-/// 3 spans of an axis, longitudinal tables on different axes, eta so near 1 that sigma's range is wide.
+/// 3 spans of an axis, longitudinal tables on different axes, an axis of absorption, eta so near 1 that sigma's range
+/// is wide.
 template <int Channels>
 MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexcept {
     fibre.tables = nullptr;
-    if (!fibre.scattered || !fibre.paired) return false;
+    if (!fibre.scattered || !fibre.paired || fibre.survival) return false;
     const MaterialTable &around = fibre.azimuthal, &back = fibre.back, &forward = fibre.forward;
     const AxisView<float> offset = around.view.axis(around.last_axis), theta = back.view.axis(back.last_axis);
     const AxisView<float> phi = around.view.axis(around.view.parameter_axes());
@@ -218,12 +239,14 @@ template <int Channels = 3>
 struct Longitudinal {
     bool valid = false;
     float theta_i = 0;
-    float sigma = 0;  ///< optical radius sigma_ms kappa / cos theta_t [1]
+    float sigma = 0;     ///< optical radius sigma_ms kappa / cos theta_t [1]
+    float absorbed = 0;  ///< optical radius of absorption, sigma_ma kappa / cos theta_t [1]
     Inclination<float> at = {};
     Absorption<Channels> absorption = {};
     TruncatedGaussian<float> gaussian[3] = {};
     LongitudinalPoint point;    ///< set where the fibre scatters and its tables are unfolded
     Contraction back, forward;  ///< set where the fibre scatters and they are not
+    Contraction survival;       ///< of the axes before h, where the fibre has such a table
 };
 
 /// Sets m.back and m.forward: the longitudinal factors contracted to m.sigma and theta_i.
@@ -252,10 +275,17 @@ MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, 
     m.valid = true;
     m.theta_i = theta_i;
     m.at = inclination(fibre.parameters.eta, cos_i, fibre.parameters.fresnel);
-    m.absorption = absorption(fibre.parameters, m.at.inverse_cos_t);
+    m.absorption = absorption(fibre.parameters, m.at.inverse_cos_t, static_cast<bool>(fibre.survival));
     for (int p = 0; p < 3; ++p) m.gaussian[p] = truncated_gaussian(fibre.shift[p] - theta_i, fibre.deviation[p]);
     m.sigma = fibre.parameters.sigma_ms * fibre.parameters.kappa * m.at.inverse_cos_t;
+    m.absorbed = fibre.parameters.sigma_ma * fibre.parameters.kappa * m.at.inverse_cos_t;
     if (!fibre.scattered) return;
+    if (fibre.survival) {
+        const float at[3] = {m.sigma, fibre.parameters.g, m.absorbed};
+        start_contraction(fibre.survival, m.survival.weight);
+        for (std::uint32_t k = 0; k < 3; ++k)
+            contract_axis(fibre.survival, k, at[k], m.survival.weight, m.survival.weight);
+    }
     if (fibre.tables != nullptr)
         m.point = fibre.tables->longitudinal_at(std::abs(theta_i));
     else
@@ -322,6 +352,36 @@ struct NearField {
     }
 };
 
+/// Share of the scattered light that the medulla's absorption leaves at an offset [medulla radii]; 1 where Eq. 20's T_b
+/// has it.
+template <int Channels>
+MEDULLA_FN float survival_at(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m, float offset) noexcept {
+    const TableView& table = fibre.survival;
+    if (!table) return 1;
+    const AxisPoint at = axis_point(table, 3, offset);
+    const std::uint32_t stride = table.layout.rank_stride;
+    float length = 0;
+    for (std::uint32_t t = 0; t < 4; ++t)
+        length += at.weights.w[t] * detail::row_sum(table, 3, at.span + t, m.survival.weight, 0, stride);
+    return survival_of(m.absorbed, length);
+}
+template <int Channels>
+MEDULLA_FN Four survival_at(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m, Four offset) noexcept {
+    return Four(survival_at(fibre, m, lane(offset, 0)), survival_at(fibre, m, lane(offset, 1)),
+                survival_at(fibre, m, lane(offset, 2)), survival_at(fibre, m, lane(offset, 3)));
+}
+
+/// Energies of the five lobes on a path (or four), with what absorption leaves of the scattered ones.
+template <int Channels, class T>
+MEDULLA_FN Energies<Channels, T> energies_at(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m,
+                                             const Path<T>& path, bool scattered) noexcept {
+    Energies<Channels, T> e = energies(path, m.absorption, scattered);
+    if (!scattered || !fibre.survival) return e;
+    const T left = survival_at(fibre, m, magnitude(path.h_inside) * T(1 / fibre.parameters.kappa));
+    for (int c = 0; c < Channels; ++c) e.A[3][c] = e.A[3][c] * left, e.A[4][c] = e.A[4][c] * left;
+    return e;
+}
+
 /// Scattered lobes that carry less than this of the incident energy in every channel are left out: it bounds the error
 /// of the fibre's albedo, and it is what a float sum of energies near 1 cannot show.
 inline constexpr float negligible_energy = 5.9604645e-8f;  // 2^-24
@@ -337,17 +397,20 @@ MEDULLA_FN void offset_at(NearField<Channels>& near, float h) noexcept {
     near.side = h < 0 ? -1.0f : 1.0f;
     for (int k = 0; k < 3; ++k) near.centre[k] = unscattered_centre(k, path.gamma_i, path.gamma_t);
     for (int k = 1; k < 3; ++k) near.centre[k + 2] = scattered_centre(k, path.gamma_i, path.gamma_t) + float(pi);
-    near.energy = energies(path, m.absorption, fibre.scattered);
+    near.energy = energies_at(fibre, m, path, fibre.scattered);
     near.scattered = false;
     for (int c = 0; c < Channels; ++c)
         near.scattered = near.scattered || near.energy.A[3][c] + near.energy.A[4][c] > negligible_energy;
     if (!near.scattered) return;
     const float offset = std::abs(path.h_inside) / p.kappa;
     near.offset = offset < 1 ? offset : 1.0f;
-    if (fibre.tables != nullptr)
+    if (fibre.tables != nullptr) {
         near.point = fibre.tables->azimuthal_at(fibre.tables->sigma_at(m.sigma), near.offset);
-    else
-        contract(fibre.azimuthal, m.sigma, near.offset, near.azimuthal);
+        return;
+    }
+    const float* weight = weights_at(fibre.azimuthal, m.absorbed, near.azimuthal.weight);
+    contract(fibre.azimuthal, weight, sigma_point(fibre.azimuthal, m.sigma), last_point(fibre.azimuthal, near.offset),
+             near.azimuthal);
 }
 
 /// @param h offset [fibre radii], in [-1, 1]; outside it every lobe is 0

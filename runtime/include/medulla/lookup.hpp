@@ -308,8 +308,30 @@ MEDULLA_FN T longitudinal_energy(T sigma, T theta_i) noexcept {
     return -std::expm1(T(-2) * sigma / std::cos(theta_i));
 }
 
+/// Whether a pack knows what absorption leaves: its azimuthal table has that axis, and the lengths stand beside it.
+MEDULLA_FN bool absorbs(const PackView& pack) noexcept {
+    return pack[TableKind::survival] && pack[TableKind::azimuthal] && pack[TableKind::azimuthal].parameter_axes() == 4;
+}
+
+/// exp(-absorption length), in [0, 1]. A low-rank length below 0 would be light out of nowhere: it is 0.
+template <class T>
+MEDULLA_FN T survival_of(T absorption, T length) noexcept {
+    return std::exp(-absorption * (length < T(0) ? T(0) : length));
+}
+
+/// Share of the disc's scattered light that absorption leaves; h in [-1, 1]. 1 at absorption 0; NaN above it where the
+/// pack does not know.
+MEDULLA_FN float survival(const PackView& pack, float sigma, float g, float h, float absorption) noexcept {
+    if (absorption == 0) return 1;
+    if (!absorbs(pack)) return std::numeric_limits<float>::quiet_NaN();
+    LobeQuery query;
+    query.sigma = sigma, query.g = g, query.h = h < 0 ? -h : h, query.absorption = absorption;
+    const TableView& table = pack[TableKind::survival];
+    return survival_of(absorption, scalar(table, contract(table, query)));
+}
+
 /// C^N(phi; sigma, g, h) [1/radian], scattered light only; h in [-1, 1], phi = 0 forward. A `sigma` of 0 gives 0.
-/// NaN where the pack has no azimuthal table.
+/// NaN where the pack has no azimuthal table, or absorption is asked for that it does not know.
 MEDULLA_FN float azimuthal(const PackView& pack, float sigma, float g, float h, float phi,
                            float absorption = 0) noexcept {
     const TableView& table = pack[TableKind::azimuthal];
@@ -317,7 +339,8 @@ MEDULLA_FN float azimuthal(const PackView& pack, float sigma, float g, float h, 
     const float side = h < 0 ? -1.0f : 1.0f;
     LobeQuery query;
     query.sigma = sigma, query.g = g, query.h = side * h, query.absorption = absorption;
-    return azimuthal_energy(sigma, h) * lobe(table, contract(table, query), side * phi);
+    const float energy = azimuthal_energy(sigma, h) * survival(pack, sigma, g, h, absorption);
+    return energy * lobe(table, contract(table, query), side * phi);
 }
 
 enum class Side { back, forward };

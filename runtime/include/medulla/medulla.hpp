@@ -41,6 +41,7 @@
 #include "medulla/fur_parameters.hpp"
 #include "medulla/gauss_legendre.hpp"
 #include "medulla/gaussian.hpp"
+#include "medulla/held_integral.hpp"
 #include "medulla/lanes.hpp"
 #include "medulla/lookup.hpp"
 #include "medulla/pack.hpp"

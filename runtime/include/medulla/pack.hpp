@@ -16,6 +16,10 @@ inline constexpr std::uint32_t pack_version = 3;
 inline constexpr std::uint32_t max_rank = 512;
 inline constexpr std::uint32_t max_axes = 6;
 inline constexpr std::uint32_t max_spans = 4096;
+/// Sum over components of |scale| times the greatest number in every axis: what a value can reach. Over the least
+/// integral that lookup.hpp divides by, 1e-30, that is a finite float: no pack makes an infinity or a NaN. The pack
+/// built in reaches 1540.
+inline constexpr float most_reach = 1e7f;
 inline constexpr std::uint32_t rank_multiple = 8;  ///< rows are padded with zeros to a multiple of this rank
 
 MEDULLA_FN constexpr std::uint32_t padded_rank(std::uint32_t rank) noexcept {
@@ -48,8 +52,13 @@ enum class TableKind : std::uint32_t {
     longitudinal_back = 1,     ///< C^M of the backward side, axes (sigma, g, theta_i, theta_r)
     longitudinal_forward = 2,  ///< C^M of the forward side, the same axes
     back_fraction = 3,         ///< share of the slab's scattered energy that leaves backward, axes (sigma, g, theta_i)
+    survival =
+        4,  ///< length l: exp(-absorption l) of the disc's scattered light is left, axes (sigma, g, absorption, h)
 };
-inline constexpr std::uint32_t table_kinds = 4;
+inline constexpr std::uint32_t table_kinds = 5;
+
+/// Whether a table has an exit axis: lobes do.
+MEDULLA_FN constexpr bool is_lobe(TableKind kind) noexcept { return kind <= TableKind::longitudinal_forward; }
 
 struct PackHeader {
     char magic[8];
@@ -167,7 +176,7 @@ inline const char* describe(PackStatus status) noexcept {
         case PackStatus::bad_knots:
             return "an axis's knots do not increase, or do not span its range";
         case PackStatus::bad_number:
-            return "a scale or integral is not finite";
+            return "a scale or integral is not finite, or its lobes could exceed any density";
         case PackStatus::out_of_bounds:
             return "an offset points outside the pack";
     }
@@ -194,7 +203,7 @@ MEDULLA_FN bool inside(std::uint64_t offset, std::uint64_t bytes, std::uint64_t 
     return offset >= sizeof(PackHeader) && offset <= total && bytes <= total - offset;
 }
 
-/// Axes of a kind in their order; absorption may follow g in the azimuthal table.
+/// Axes of a kind in their order; absorption may follow g in the azimuthal table, and does in that of survival.
 MEDULLA_FN bool axes_fit(const PackTable& table) noexcept {
     const auto kind = static_cast<TableKind>(table.kind);
     Quantity expected[max_axes] = {Quantity::sigma, Quantity::g};
@@ -203,16 +212,19 @@ MEDULLA_FN bool axes_fit(const PackTable& table) noexcept {
         if (table.axis_count == 5) expected[n++] = Quantity::absorption;
         expected[n++] = Quantity::h;
         expected[n++] = Quantity::phi;
+    } else if (kind == TableKind::survival) {
+        expected[n++] = Quantity::absorption;
+        expected[n++] = Quantity::h;
     } else {
         expected[n++] = Quantity::theta_i;
-        if (kind != TableKind::back_fraction) expected[n++] = Quantity::theta_r;
+        if (is_lobe(kind)) expected[n++] = Quantity::theta_r;
     }
     if (table.axis_count != n) return false;
     for (std::uint32_t k = 0; k < n; ++k) {
         if (table.axes[k].quantity != static_cast<std::uint32_t>(expected[k])) return false;
         if (table.axes[k].spans < 1 || table.axes[k].spans > max_spans) return false;
     }
-    return (table.integrals_offset != 0) == (kind != TableKind::back_fraction);
+    return (table.integrals_offset != 0) == is_lobe(kind);
 }
 
 MEDULLA_FN PackStatus check_knots(const AxisView<float>& axis) noexcept {
@@ -261,12 +273,17 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
         if (!half_circle(view.axis(k), quantity)) return PackStatus::bad_knots;
     }
     const std::uint32_t offsets[2] = {table.scales_offset, table.integrals_offset};
+    float sum[2] = {0, 0};
     for (std::uint32_t i = 0; i < (view.has_exit() ? 2u : 1u); ++i) {
         if (!inside(offsets[i], std::uint64_t(table.rank_stride) * 4, total)) return PackStatus::out_of_bounds;
-        for (std::uint32_t r = 0; r < table.rank_stride; ++r)
-            if (!finite(load<float>(view.bytes + offsets[i] + 4 * r))) return PackStatus::bad_number;
+        for (std::uint32_t r = 0; r < table.rank_stride; ++r) {
+            const float value = load<float>(view.bytes + offsets[i] + 4 * r);
+            if (!finite(value)) return PackStatus::bad_number;
+            sum[i] += std::abs(value);
+        }
     }
-    return PackStatus::ok;
+    for (std::uint32_t k = 0; k < table.axis_count; ++k) sum[0] *= float(greatest_number);
+    return sum[0] <= most_reach ? PackStatus::ok : PackStatus::bad_number;
 }
 
 }  // namespace detail

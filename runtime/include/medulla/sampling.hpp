@@ -196,7 +196,7 @@ struct FarSampler {
 
   private:
     MEDULLA_FN detail::LobeShares shares_at(const Path<float>& path) const noexcept {
-        return detail::lobe_shares(energies(path, far->near.longitudinal.absorption, far->nodes > 0));
+        return detail::lobe_shares(energies_at(far->fibre(), far->near.longitudinal, path, far->nodes > 0));
     }
     MEDULLA_FN float scattered_azimuth(int p, float phi) const noexcept {
         float sum = even_share * float(1 / (2 * pi));
@@ -219,7 +219,8 @@ MEDULLA_FN void FarSampler<Channels>::prepare(const FarField<Channels>& field) n
     const MaterialTable& table = fibre.azimuthal;
     const std::uint32_t stride = table.view.layout.rank_stride;
     Contraction mean_lobe[2], at_sigma, at;
-    contract_axis(table.view, table.sigma_axis, field.near.longitudinal.sigma, table.weight, at_sigma.weight);
+    const float* weight = weights_at(table, field.near.longitudinal.absorbed, at_sigma.weight);
+    contract_axis(table.view, table.sigma_axis, field.near.longitudinal.sigma, weight, at_sigma.weight);
     float energy[2] = {}, moment[2][2] = {};
     for (auto& lobe : mean_lobe)
         for (std::uint32_t r = 0; r < stride; ++r) lobe.weight[r] = 0;
@@ -261,7 +262,7 @@ MEDULLA_FN float FarSampler<Channels>::pdf_angular(float theta_r, float phi) con
         if (!(M > 0)) continue;
         Four average;
         detail::visit_unscattered(*far, p, turned, [&](const Path<Four>& path, Four weight, Four D) {
-            const auto e = energies(path, far->near.longitudinal.absorption, far->nodes > 0);
+            const auto e = energies_at(far->fibre(), far->near.longitudinal, path, far->nodes > 0);
             Four all, own;
             for (int lobe = 0; lobe < lobe_count; ++lobe)
                 for (int c = 0; c < Channels; ++c) all = all + e.A[lobe][c];

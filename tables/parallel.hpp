@@ -1,0 +1,16 @@
+// Jobs over threads. Plain threads, not OpenMP: an exception of one job reaches the caller, and tsan sees every
+// handover.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+
+namespace medulla::tables {
+
+/// Calls job(0) .. job(count - 1) in that order, each on one of `threads` threads (0: as many as OpenMP would take).
+/// Begins no further ones once `stop` is set or one has thrown; rethrows the first exception after all have ended.
+void in_parallel(std::size_t count, int threads, const std::atomic<bool>& stop,
+                 const std::function<void(std::size_t)>& job);
+
+}  // namespace medulla::tables

@@ -1,6 +1,5 @@
 // The BCSDF's nanoseconds beside its errors: lookups by rank, near field, far field by quality and by segments,
-// sampling. Build: g++ -O2 -std=c++17 -I runtime/include -I tests bench/bench_bcsdf.cpp -o bench_bcsdf Run: bench_bcsdf
-// [--pack FILE.furpack] [--json FILE]; without a pack, the analytic one of the tests.
+// sampling. Run: bench_bcsdf [--pack FILE.furpack] [--json FILE]; without a pack, the one built into the runtime.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -22,14 +21,17 @@ namespace {
 
 volatile float sink;
 
-/// Nanoseconds per item: the least of nine runs, since the machine's other work only ever adds.
+/// Nanoseconds per item: the least of many runs within half a second, each well below a scheduler's slice, since the
+/// machine's other work only ever adds.
 template <class Run>
 double nanoseconds(int items, Run&& run) {
+    using Clock = std::chrono::steady_clock;
     double best = 1e300;
-    for (int repeat = 0; repeat < 9; ++repeat) {
-        const auto start = std::chrono::steady_clock::now();
+    const auto end = Clock::now() + std::chrono::milliseconds(500);
+    for (int repeat = 0; repeat < 9 || (repeat < 4000 && Clock::now() < end); ++repeat) {
+        const auto start = Clock::now();
         run();
-        const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+        const std::chrono::duration<double> took = Clock::now() - start;
         best = std::min(best, took.count() * 1e9 / items);
     }
     return best;
@@ -68,40 +70,59 @@ std::vector<Query> queries(int count) {
     return q;
 }
 
-void bench_lookups(const PackView& pack, const std::string& label) {
-    const TableView& view = pack[TableKind::azimuthal];
-    MaterialTable material;
-    prepare_table(view, 0.4f, material);
+/// C^N of a material (g = 0.4, sigma_ms kappa = 2) read from the factors and from its unfolded tables: one angle of a
+/// prepared lobe, and the share of one lookup where sigma and h are contracted for TTs and TRTs, which read two angles.
+void bench_lookups(const PackView& pack, const std::string& label, UnfoldedTables& tables) {
+    FurParameters<3> p;
+    p.kappa = 0.8f, p.sigma_ms = 2.5f, p.g = 0.4f;
+    FurFibre<3> fibre;
+    prepare(p, pack, fibre);
+    if (!unfold(fibre, tables)) return;
+    const MaterialTable& material = fibre.azimuthal;
+    const auto q = queries(512);
     Contraction c;
-    const auto q = queries(4096);
-    contract(material, 2.0f, 0.3f, c);
-    const std::string rank = "rank " + std::to_string(view.layout.even_rank + view.layout.odd_rank) + label;
-    report("lookup of a prepared lobe, " + rank,
-           nanoseconds(int(q.size()),
-                       [&] {
-                           float sum = 0;
-                           for (const Query& x : q) sum += lobe(material, c, x.phi);
-                           sink = sum;
-                       }),
-           "ns");
-    report("lookup with sigma and h contracted, two angles, " + rank,
-           nanoseconds(int(q.size()),
-                       [&] {
-                           float sum = 0;
-                           for (const Query& x : q) {
-                               contract(material, 2 + x.theta_i, std::abs(x.h), c);
-                               sum += lobe(material, c, x.phi) + lobe(material, c, x.theta_r);
-                           }
-                           sink = sum;
-                       }),
-           "ns");
-}
-
-void bench_near(const FurFibre<3>& fibre) {
-    const auto q = queries(4096);
     double error = 0, norm = 0;
     for (const Query& x : q) {
-        if (std::abs(x.h) > 0.999f) continue;
+        const float sigma = 2.2f + 0.1f * x.theta_i;
+        contract(material, sigma, std::abs(x.h), c);
+        const double slow = double(lobe(material, c, x.phi)),
+                     fast = double(
+                         tables.azimuthal_density(tables.azimuthal_at(tables.sigma_at(sigma), std::abs(x.h)), x.phi));
+        error += (fast - slow) * (fast - slow), norm += slow * slow;
+    }
+    const std::string rank = std::to_string(material.view.layout.even_rank + material.view.layout.odd_rank) + label;
+    const auto time = [&](auto&& value) {
+        return nanoseconds(int(q.size()), [&] {
+            float sum = 0;
+            for (const Query& x : q) sum += value(x);
+            sink = sum;
+        });
+    };
+    contract(material, 2.2f, 0.3f, c);
+    report("lookup of a prepared lobe, factors, rank " + rank,
+           time([&](const Query& x) { return lobe(material, c, x.phi); }), "ns");
+    const AzimuthalPoint at = tables.azimuthal_at(tables.sigma_at(2.2f), 0.3f);
+    report("lookup of a prepared lobe, unfolded, rank " + rank,
+           time([&](const Query& x) { return tables.azimuthal_density(at, x.phi); }), "ns", std::sqrt(error / norm));
+    report("lookup, half of contracting and two angles, factors, rank " + rank,
+           0.5 * time([&](const Query& x) {
+               contract(material, 2.2f + 0.1f * x.theta_i, std::abs(x.h), c);
+               return lobe(material, c, x.phi) + lobe(material, c, x.theta_r);
+           }),
+           "ns");
+    report("lookup, half of contracting and two angles, unfolded, rank " + rank,
+           0.5 * time([&](const Query& x) {
+               const AzimuthalPoint here = tables.azimuthal_at(tables.sigma_at(2.2f + 0.1f * x.theta_i), std::abs(x.h));
+               return tables.azimuthal_density(here, x.phi) + tables.azimuthal_density(here, x.theta_r);
+           }),
+           "ns", std::sqrt(error / norm));
+}
+
+/// All five lobes in RGB; errors against the double-precision twin, which reads the factors.
+void bench_near(const FurFibre<3>& fibre, const std::string& how) {
+    const auto q = queries(512);
+    double error = 0, norm = 0;
+    for (const Query& x : q) {
         const auto a = near_lobes(fibre, x.theta_i, x.theta_r, x.phi, x.h);
         const PackView pack = {{fibre.azimuthal.view, fibre.back.view, fibre.forward.view, {}}, nullptr, 0};
         const auto b = reference::near_lobes(fibre.parameters, pack, double(x.theta_i), double(x.theta_r),
@@ -110,44 +131,40 @@ void bench_near(const FurFibre<3>& fibre) {
         for (int k = 0; k < lobe_count; ++k) va += double(a.M[k]) * double(a.N[k][0]), vb += b.M[k] * b.N[k][0];
         error += (va - vb) * (va - vb), norm += vb * vb;
     }
-    report("near field, five lobes, RGB, from scratch",
-           nanoseconds(int(q.size()),
-                       [&] {
-                           float sum = 0;
-                           for (const Query& x : q) sum += eval(fibre, x.theta_i, x.theta_r, x.phi, x.h).value[0];
-                           sink = sum;
-                       }),
-           "ns", std::sqrt(error / norm));
+    const double relative = std::sqrt(error / norm);
+    const auto time = [&](auto&& value) {
+        return nanoseconds(int(q.size()), [&] {
+            float sum = 0;
+            for (const Query& x : q) sum += value(x);
+            sink = sum;
+        });
+    };
+    report("near field, from scratch, " + how,
+           time([&](const Query& x) { return eval(fibre, x.theta_i, x.theta_r, x.phi, x.h).value[0]; }), "ns",
+           relative);
     NearField<3> near;
-    report("near field, preparing (theta_i, h)",
-           nanoseconds(int(q.size()),
-                       [&] {
-                           float sum = 0;
-                           for (const Query& x : q) near_field(fibre, x.theta_i, x.h, near), sum += near.energy.A[0][0];
-                           sink = sum;
-                       }),
+    report("near field, preparing (theta_i, h), " + how, time([&](const Query& x) {
+               near_field(fibre, x.theta_i, x.h, near);
+               return near.energy.A[0][0];
+           }),
            "ns");
     near_field(fibre, 0.3f, 0.4f, near);
-    report("near field, one exit of a prepared (theta_i, h)",
-           nanoseconds(int(q.size()),
-                       [&] {
-                           float sum = 0;
-                           for (const Query& x : q) sum += near.eval(x.theta_r, x.phi).value[0];
-                           sink = sum;
-                       }),
-           "ns");
-    report("near field, per exit in batches of 16",
-           nanoseconds(int(q.size()),
-                       [&] {
-                           float sum = 0;
-                           for (std::size_t i = 0; i < q.size(); i += 16) {
-                               near_field(fibre, q[i].theta_i, q[i].h, near);
-                               for (std::size_t k = i; k < i + 16; ++k)
-                                   sum += near.eval(q[k].theta_r, q[k].phi).value[0];
-                           }
-                           sink = sum;
-                       }),
-           "ns");
+    report("near field, one exit of a prepared (theta_i, h), " + how,
+           time([&](const Query& x) { return near.eval(x.theta_r, x.phi).value[0]; }), "ns", relative);
+    std::vector<float> theta_r, phi;
+    for (const Query& x : q) theta_r.push_back(x.theta_r), phi.push_back(x.phi);
+    std::vector<Colour<3>> S(q.size());
+    for (int batch : {16, 256})
+        report("near field, per exit, batches of " + std::to_string(batch) + " and their preparing, " + how,
+               nanoseconds(int(q.size()),
+                           [&] {
+                               for (std::size_t i = 0; i < q.size(); i += std::size_t(batch)) {
+                                   near_field(fibre, q[i].theta_i, q[i].h, near);
+                                   eval(near, batch, &theta_r[i], &phi[i], &S[i]);
+                               }
+                               sink = S[3].value[0];
+                           }),
+               "ns", relative);
 }
 
 /// Mean of the double-precision near field over [-1, 1], as tests/test_bcsdf_far.cpp has it.
@@ -214,10 +231,12 @@ void bench_far(const PackView& pack) {
     const int segments[4] = {5, 8, 16, 64}, midpoints[4] = {8, 32, 128, 512};
     double segment_error[4][3] = {}, midpoint_error[4] = {};
     std::vector<FurFibre<3>> fibres(fur_preset_count);
+    std::vector<UnfoldedTables> tables(fur_preset_count);
     for (int animal = 0; animal < fur_preset_count; ++animal) {
         FurParameters<3> p = parameters_of<3>(fur_presets[animal]);
         FurFibre<3>& fibre = fibres[std::size_t(animal)];
         prepare(p, pack, fibre);
+        unfold(fibre, tables[std::size_t(animal)]);
         for (const Query& x : q) {
             const auto r = mean_of_near(p, pack, double(x.theta_i), double(x.phi), int(60 + 8 / double(p.beta_n)));
             double whole = 0;
@@ -246,46 +265,68 @@ void bench_far(const PackView& pack) {
             }
         }
     }
-    const auto many = queries(256);
-    const int items = int(many.size()) * fur_preset_count;
+    const auto many = queries(64);
+    FarField<3> far;
+    /// Mean over animals of the least time over directions: animals one by one, so that runs stay short.
+    const auto time = [&](const std::vector<FurFibre<3>>& animals, auto&& value) {
+        double sum = 0;
+        for (const FurFibre<3>& fibre : animals)
+            sum += nanoseconds(int(many.size()), [&] {
+                float total = 0;
+                for (const Query& x : many) total += value(fibre, x);
+                sink = total;
+            });
+        return sum / fur_preset_count;
+    };
     for (int j = 0; j < 3; ++j) {
-        const double time = nanoseconds(items, [&] {
-            float sum = 0;
-            FarField<3> far;
-            for (const FurFibre<3>& fibre : fibres)
-                for (const Query& x : many)
-                    far_field(fibre, x.theta_i, OffsetRange{}, far, qualities[j]),
-                        sum += far.eval(x.theta_r, x.phi).value[0];
-            sink = sum;
-        });
-        report(std::string("far field, five lobes, RGB, from scratch, ") + names[j], time, "ns",
-               std::sqrt(error[j][lobe_count] / norm[lobe_count]));
+        report(std::string("far field, from scratch, mean of ten animals, ") + names[j],
+               time(fibres,
+                    [&](const FurFibre<3>& fibre, const Query& x) {
+                        far_field(fibre, x.theta_i, OffsetRange{}, far, qualities[j]);
+                        return far.eval(x.theta_r, x.phi).value[0];
+                    }),
+               "ns", std::sqrt(error[j][lobe_count] / norm[lobe_count]));
         for (int k = 0; k < lobe_count; ++k)
             report(std::string("  its error in ") + lobe_names[k], std::sqrt(error[j][k] / norm[k]), "");
     }
-    report("far field, one exit of a prepared theta_i, standard",
-           nanoseconds(items,
-                       [&] {
-                           float sum = 0;
-                           FarField<3> far;
-                           for (const FurFibre<3>& fibre : fibres) {
-                               far_field(fibre, 0.3f, OffsetRange{}, far);
-                               for (const Query& x : many) sum += far.eval(x.theta_r, x.phi).value[0];
-                           }
-                           sink = sum;
-                       }),
+    for (const FurFibre<3>& fibre : fibres)
+        report(std::string("  standard, ") + fur_presets[&fibre - &fibres[0]].name,
+               nanoseconds(int(many.size()),
+                           [&] {
+                               float sum = 0;
+                               for (const Query& x : many)
+                                   far_field(fibre, x.theta_i, OffsetRange{}, far),
+                                       sum += far.eval(x.theta_r, x.phi).value[0];
+                               sink = sum;
+                           }),
+               "ns");
+    report("far field, preparing theta_i, standard",
+           time(fibres,
+                [&](const FurFibre<3>& fibre, const Query& x) {
+                    far_field(fibre, x.theta_i, OffsetRange{}, far);
+                    return far.inverse_width;
+                }),
+           "ns");
+    std::vector<FurFibre<3>> factors = fibres;
+    for (FurFibre<3>& fibre : factors) fibre.tables = nullptr;
+    report("far field, from scratch, factors, standard",
+           time(factors,
+                [&](const FurFibre<3>& fibre, const Query& x) {
+                    far_field(fibre, x.theta_i, OffsetRange{}, far);
+                    return far.eval(x.theta_r, x.phi).value[0];
+                }),
            "ns");
     for (int j = 0; j < 4; ++j) {
-        const double time = nanoseconds(64, [&] {
+        const double cost = nanoseconds(16, [&] {
             float sum = 0;
-            for (int i = 0; i < 64; ++i)
+            for (int i = 0; i < 16; ++i)
                 for (int m = 0; m < midpoints[j]; ++m)
                     sum += eval(fibres[0], many[std::size_t(i)].theta_i, many[std::size_t(i)].theta_r,
                                 many[std::size_t(i)].phi, float((2 * m + 1.0) / midpoints[j] - 1))
                                .value[0];
             sink = sum;
         });
-        report("baseline: mean of " + std::to_string(midpoints[j]) + " near evaluations even in h", time, "ns",
+        report("baseline: mean of " + std::to_string(midpoints[j]) + " near evaluations even in h", cost, "ns",
                std::sqrt(midpoint_error[j] / norm[lobe_count]));
     }
     for (int j = 0; j < 4; ++j)
@@ -393,21 +434,25 @@ int main(int argc, char** argv) {
         else
             return std::fprintf(stderr, "usage: bench_bcsdf [--pack FILE.furpack] [--json FILE]\n"), 2;
     }
-    const analytic::AnalyticPack analytic_pack(15, 16), rank64(63, 16);
-    std::vector<unsigned char> bytes = analytic_pack.bytes;
+    std::vector<unsigned char> bytes;
     if (!pack_file.empty()) {
         std::ifstream in(pack_file, std::ios::binary);
         bytes.assign(std::istreambuf_iterator<char>(in), {});
     }
-    const OpenResult opened = open_pack(bytes.data(), bytes.size());
+    const OpenResult opened =
+        pack_file.empty() ? open_pack(default_pack_words, default_pack_size) : open_pack(bytes.data(), bytes.size());
     if (opened.status != PackStatus::ok)
         return std::fprintf(stderr, "%s: %s\n", pack_file.c_str(), describe(opened.status)), 1;
-    if (!pack_file.empty()) bench_lookups(opened.pack, " (the pack)");
-    bench_lookups(analytic_pack.view, "");
-    bench_lookups(rank64.view, "");
+    const analytic::AnalyticPack rank16(15, 16), rank64(63, 16);
+    std::vector<UnfoldedTables> tables(1);
+    bench_lookups(rank16.view, "", tables[0]);
+    bench_lookups(rank64.view, "", tables[0]);
+    bench_lookups(opened.pack, pack_file.empty() ? " (the default pack)" : " (the pack)", tables[0]);
     FurFibre<3> fibre;
     prepare(parameters_of<3>(fur_presets[0]), opened.pack, fibre);
-    bench_near(fibre);
+    bench_near(fibre, "factors");
+    report("unfolding a material", nanoseconds(1, [&] { sink = unfold(fibre, tables[0]) ? 1.0f : 0.0f; }) / 1000, "us");
+    bench_near(fibre, "unfolded");
     bench_far(opened.pack);
     bench_sampling(fibre);
     if (json_file.empty()) return 0;

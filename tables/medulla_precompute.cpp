@@ -217,13 +217,18 @@ void declare(CLI::App& app, Words& words) {
     app.add_option("--method", words.method, "how each cell is solved")
         ->check(CLI::IsMember({"auto", "analog", "mc", "deterministic"}))
         ->capture_default_str();
-    CLI::Option_group* done = app.add_option_group("done", "When a cell is done");
-    done->add_option("--paths", words.paths, "paths per cell of the random methods")->capture_default_str();
-    done->add_option("--target-error", words.target_error,
-                     "relative L2 standard error below which each cell is solved, 1e-6 to 0.1");
-    done->add_option("--time-budget", words.time_budget,
-                     "seconds for the job, spent where error falls most (results then depend on the machine's speed)");
-    done->require_option(0, 1);
+    // Each excludes the others. (An option group would do it too, but CLI11 2.1 does not end on stray words beside
+    // one.)
+    CLI::Option* paths =
+        app.add_option("--paths", words.paths, "paths per cell of the random methods")->capture_default_str();
+    CLI::Option* target =
+        app.add_option("--target-error", words.target_error,
+                       "instead: relative L2 standard error below which each cell is solved, 1e-6 to 0.1")
+            ->excludes(paths);
+    app.add_option(
+           "--time-budget", words.time_budget,
+           "instead: seconds for the job, spent where error falls most (results then depend on the machine's speed)")
+        ->excludes(paths, target);
     app.add_option("--seed", words.seed, "of the random methods")->capture_default_str();
     app.add_option("--threads", words.threads, "0: all")->capture_default_str();
     app.add_flag("--resume", words.resume, "go on from the slices kept in OUTPUT.shards/");

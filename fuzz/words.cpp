@@ -23,6 +23,8 @@ std::vector<std::string> words_of(const unsigned char* data, std::size_t size) {
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
     if (size == 0 || size > 4096) return 0;
     std::vector<std::string> words = words_of(data + 1, size - 1);
+    for (const std::string& word : words)
+        if (word.empty()) return 0;            // refused before they are parsed (tables/program.cpp)
     std::reverse(words.begin(), words.end());  // CLI11 takes a vector from its end
     try {
         CLI::App app("fuzz");

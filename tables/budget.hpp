@@ -10,13 +10,13 @@
 namespace medulla::tables {
 
 /// Errors by which slices are refined, one after the other: a half of a decade each.
-inline constexpr double refinements[] = {1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5};
+inline constexpr double refinements[] = {1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4};
 
 /// A slice that is to be bettered, and what is known of it.
 struct Refinable {
     SliceId id;
     std::vector<double> standard_error;  ///< of its cells
-    double seconds = 0;                  ///< its last solve took; 0: not known
+    double seconds = 0;                  ///< its last solve took, or is thought to have taken; > 0
 };
 
 /// Solves slices again to the next of `refinements` below their worst error, that one first whose sum of squared errors

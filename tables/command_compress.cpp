@@ -72,15 +72,16 @@ void run_compress(const CompressWords& words) {
     if (words.max_bytes > 0) options.max_bytes = words.max_bytes;
     std::string input;
     for (const std::string& file : words.files) input += (input.empty() ? "" : ", ") + file_name(file);
+    refuse_input(output, words.files);
     const Tables tables = read_all(words.files);
     const CompressResult result = compress(tables, options, input);
     write_file(output, result.pack.data(), result.pack.size());
     // Who asked for no size is told what the default pack's would give.
-    std::optional<CompressResult> larger;
-    if (!words.rank && !options.max_error && !options.max_bytes) {
+    const bool unsized = !words.rank && !options.max_error && !options.max_bytes;
+    const auto larger = [&] {
         options.max_bytes = default_bytes;
-        larger = compress(tables, options, input);
-    }
+        return compress(tables, options, input);
+    };
     if (words.json) {
         nlohmann::ordered_json json = {{"output", output},
                                        {"bytes", result.pack.size()},
@@ -90,7 +91,10 @@ void run_compress(const CompressWords& words) {
             json["factors"][medulla::tables::name_of(report.kind)] = report_json(report);
         json["errors"] = to_json(result.errors);
         json["degeneracy"] = to_json(result.degeneracy);
-        if (larger) json["max_bytes_153600"] = {{"bytes", larger->pack.size()}, {"errors", to_json(larger->errors)}};
+        if (unsized) {
+            const CompressResult more = larger();
+            json["max_bytes_153600"] = {{"bytes", more.pack.size()}, {"errors", to_json(more.errors)}};
+        }
         fmt::print("{}\n", json.dump());
         return;
     }
@@ -107,9 +111,12 @@ void run_compress(const CompressWords& words) {
     print(result.degeneracy);
     fmt::print("{}: {} bytes in {:.2f} s ({:.2f} s of processor time)\n", output, result.pack.size(),
                result.solve_seconds, result.cpu_seconds);
-    if (!larger) return;
+    if (!unsized) return;
+    fmt::print("for comparison, solving for --max-bytes {} (give a size, --rank 16 say, to leave it out) ..\n",
+               default_bytes);
+    std::fflush(stdout);
     std::string errors;
-    for (const LobeError& error : larger->errors)
+    for (const LobeError& error : larger().errors)
         errors += fmt::format("{}{} {:.1e}", errors.empty() ? "" : ", ", name_of(error.kind), error.relative);
     fmt::print("with --max-bytes {}: {}\n", default_bytes, errors);
 }

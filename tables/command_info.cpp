@@ -103,6 +103,8 @@ void run_info(const FileWords& words) {
                     table["standard_error"]["worst"].get<double>());
             else
                 fmt::print("  {}: rank {}\n", name, table["rank"].get<int>());
+            for (const char* goal : {"target_error", "time_budget"})
+                if (table.contains(goal)) fmt::print("    {} {:g}\n", goal, table[goal].get<double>());
             print_axes(table["axes"]);
             if (table.contains("exit"))
                 fmt::print("    {:<10} {:>5} bins as {} spline spans\n", table["exit"]["name"].get<std::string>(),
@@ -182,7 +184,7 @@ double verify_pack(const Source& pack, const std::string& path) {
     double energy = 0;
     const double excess = share_excess(pack);
     if (!(excess <= 0.5))
-        throw Error("{}: {}: expected shares in [0, 1], found one off by {:.2e}", path,
+        throw Error("{}: {}: expected shares within 0.5 of [0, 1], found one off by {:.2e}", path,
                     name_of(TableKind::back_fraction), excess);
     for (const LobeError& error : compare(pack, pack)) {
         if (!std::isfinite(error.energy) || !(error.least >= 0))

@@ -203,7 +203,8 @@ void solve_to(Solves& solves, double error, const CompressOptions& options) {
             }
             // Between a total that was too small and one that was enough there is nothing left to try.
             if (total >= least || total > greatest_rank) total = std::min(least - rank_step, greatest_rank);
-            if (total <= floor) break;
+            // Every part keeps components: without any it would be all error.
+            if (total <= floor || total < rank_step * static_cast<int>(next.size())) break;
             while (stored_rank(next, next[0].part->kind) > total)
                 std::max_element(next.begin(), next.end(), [](const Solve& a, const Solve& b) {
                     return a.rank < b.rank;
@@ -231,8 +232,12 @@ std::string provenance(const Tables& tables, const CompressOptions& options, con
     json["program"] = tables.program;
     json["input"] = input;
     json["seed"] = options.seed;
-    for (const Table* table : tables.present())
-        json["tables"][table->name] = {{"method", table->method}, {"seed", table->seed}, {"paths", table->paths}};
+    for (const Table* table : tables.present()) {
+        nlohmann::ordered_json& out = json["tables"][table->name];
+        out = {{"method", table->method}, {"seed", table->seed}, {"paths", table->paths}};
+        if (table->target_error > 0) out["target_error"] = table->target_error;
+        if (table->time_budget > 0) out["time_budget"] = table->time_budget;
+    }
     for (const TableReport& report : reports) {
         nlohmann::ordered_json& fit = json["fit"][name_of(report.kind)];
         for (const PartReport& part : report.parts) fit["ranks"].push_back(part.rank);

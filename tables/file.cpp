@@ -91,6 +91,14 @@ void write_file(const std::string& path, const void* data, std::size_t size) {
 
 void write_file(const std::string& path, const std::string& text) { write_file(path, text.data(), text.size()); }
 
+void refuse_input(const std::string& output, const std::vector<std::string>& inputs) {
+    for (const std::string& input : inputs) {
+        std::error_code none;  // a file that is not there yet is no input
+        if (std::filesystem::equivalent(output, input, none))
+            throw Error("{}: expected another output than the input, found {}", output, input);
+    }
+}
+
 void sync_folder(const std::string& path) {
     const Descriptor folder(path, O_RDONLY | O_DIRECTORY);
     if (folder.fd < 0 || ::fsync(folder.fd) != 0) throw Error("{}: could not be brought to disk: {}", path, reason());

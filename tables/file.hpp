@@ -37,6 +37,9 @@ class PendingFile {
 void write_file(const std::string& path, const void* data, std::size_t size);
 void write_file(const std::string& path, const std::string& text);
 
+/// Throws Error if `output` is one of the files that are read: nothing is written over an input.
+void refuse_input(const std::string& output, const std::vector<std::string>& inputs);
+
 /// Brings a folder's list of names to disk. Throws Error.
 void sync_folder(const std::string& path);
 

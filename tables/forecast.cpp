@@ -37,7 +37,7 @@ Forecast forecast(const Request& request, const std::vector<SliceId>& slices, do
     if (out.measured == 0) return out;
     out.core_seconds = spent / spent_expected * expected;
     const int threads = request.threads > 0 ? request.threads : omp_get_max_threads();
-    out.seconds = request.time_budget > 0 ? request.time_budget : out.core_seconds / threads;
+    out.seconds = std::max(request.time_budget, out.core_seconds / threads);
     return out;
 }
 

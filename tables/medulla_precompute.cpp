@@ -223,7 +223,7 @@ void declare(CLI::App& app, Words& words) {
         app.add_option("--paths", words.paths, "paths per cell of the random methods")->capture_default_str();
     CLI::Option* target =
         app.add_option("--target-error", words.target_error,
-                       "instead: relative L2 standard error below which each cell is solved, 1e-6 to 0.1")
+                       "instead: relative L2 standard error below which each cell is solved, 1e-5 to 0.1")
             ->excludes(paths);
     app.add_option(
            "--time-budget", words.time_budget,

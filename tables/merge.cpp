@@ -74,8 +74,8 @@ void extend(std::optional<Table>& merged, const Table& other, const std::string&
     differ("method", merged->method, other.method);
     differ("seed", std::to_string(merged->seed), std::to_string(other.seed));
     differ("paths", std::to_string(merged->paths), std::to_string(other.paths));
-    differ("target_error", fmt::format("{:g}", merged->target_error), fmt::format("{:g}", other.target_error));
-    differ("time_budget", fmt::format("{:g}", merged->time_budget), fmt::format("{:g}", other.time_budget));
+    differ("target_error", fmt::format("{:a}", merged->target_error), fmt::format("{:a}", other.target_error));
+    differ("time_budget", fmt::format("{:a}", merged->time_budget), fmt::format("{:a}", other.time_budget));
     const auto names = [](const Table& table) {
         std::string text;
         for (const Axis& axis : table.axes) text += (text.empty() ? "" : ", ") + axis.name;

@@ -3,7 +3,6 @@
 #include <omp.h>
 
 #include <exception>
-#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -30,8 +29,8 @@ void in_parallel(std::size_t count, int threads, const std::atomic<bool>& stop,
     others.reserve(wanted);
     try {
         while (others.size() + 1 < wanted && others.size() + 1 < count) others.emplace_back(work);
-    } catch (const std::system_error&) {
-        // The system gives no more threads: those there are do it all.
+    } catch (const std::exception&) {
+        // The system gives no more threads or memory: those there are do it all.
     }
     work();
     for (std::thread& other : others) other.join();

@@ -68,11 +68,12 @@ std::optional<Tables> finished(const Job& job, const Tables& plan) {
     return tables;
 }
 
-Refinable refinable(const ShardFolder& folder, const SliceId& id) {
+/// A kept slice; what it took is not known, what it should have taken is.
+Refinable refinable(const Request& request, const ShardFolder& folder, const SliceId& id) {
     std::string why;
     const std::optional<Slice> slice = folder.read(id, why);
     if (!slice) throw Error("{}: damaged: {}", folder.file_of(id), why);
-    return {id, slice->standard_error, 0};
+    return {id, slice->standard_error, static_cast<double>(expected_cost(request, id)) * 1e-6};
 }
 
 /// Solves what `slices` misses and keeps it; with a time budget coarsely first, then where error falls most.
@@ -90,7 +91,7 @@ void solve(const Job& job, const SliceSolver& solver, const ShardFolder& folder,
             continue;
         }
         done += count;
-        if (budget > 0) coarse.push_back(refinable(folder, slices[i]));
+        if (budget > 0) coarse.push_back(refinable(job.request, folder, slices[i]));
     }
     {
         Progress progress(job.progress, "precompute", cells, done);

@@ -49,8 +49,9 @@ void check_request(const Request& request) {
         throw Error("--sigma-range: expected at most 1000, found {:g}", request.sigma.values.back());
     if (request.bins < 8 || request.bins > 4096 || request.bins % 2 != 0)
         throw Error("--bins: expected an even number from 8 to 4096, found {}", request.bins);
-    if (request.paths < 1 || request.paths > (std::uint64_t{1} << 40))
-        throw Error("--paths: expected 1 to 2^40, found {}", request.paths);
+    const int most_bits = request.method == Method::analog ? 40 : 35;  // what the tracers have random numbers for
+    if (request.paths < 1 || request.paths > (std::uint64_t{1} << most_bits))
+        throw Error("--paths: expected 1 to 2^{}, found {}", most_bits, request.paths);
     if (request.target_error != 0 && !(request.target_error >= least_target && request.target_error <= greatest_target))
         throw Error("--target-error: expected {:g} to {:g}, found {:g}", least_target, greatest_target,
                     request.target_error);

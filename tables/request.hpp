@@ -31,7 +31,7 @@ struct Request {
 Request default_request();
 
 /// Least and greatest target_error.
-inline constexpr double least_target = 1e-6, greatest_target = 0.1;
+inline constexpr double least_target = 1e-5, greatest_target = 0.1;
 
 /// Throws Error unless a solver can answer for every cell.
 void check_request(const Request& request);

@@ -22,7 +22,8 @@ struct Needs {
 std::optional<Needs> needs_of(const FurParameters<3>& fur);
 
 /// The request's nodes that the materials need: those around each interval and one more on either side, which a cubic
-/// takes. theta_i stays whole. Nodes keep their values, so that cells are the same as in the whole tables.
+/// takes. theta_i stays whole. Nodes keep their values, so that cells are the same as in the whole tables (but with a
+/// target error, where one choice of grids serves all offsets of a slice).
 /// @param notes where an axis ends before a material's needs do, one line each   @throws Error that names material
 /// and axis where the axis holds nothing of what a material needs, or where no material needs a table
 Request restrict_to(const Request& request, const std::vector<Material>& materials, std::vector<std::string>& notes);

@@ -33,9 +33,10 @@ std::uint64_t cell_key(std::uint64_t kind, std::initializer_list<double> paramet
     return key;
 }
 
-/// Stores a solved cell. Lobes are brought to integral 1 in the float that is stored.
+/// Stores a solved cell, its lobe as floats.
 void store(Slice& slice, std::size_t cell, const sim2d::Profile& profile) {
     if (profile.lobe.size() != slice.bins) throw Error("cell {}: the solver returned no lobe", cell);
+    if (!(profile.standard_error >= 0)) throw Error("cell {}: the solver knows no error", cell);
     for (std::size_t b = 0; b < slice.bins; ++b)
         slice.lobe[cell * slice.bins + b] = static_cast<float>(profile.lobe[b]);
     slice.energy[cell] = profile.energy;
@@ -70,7 +71,8 @@ auto count_until(const Goal& goal, Trace&& trace) {
         auto counted = trace(paths);
         const double ratio = worst_error(counted) / goal.target_error;
         if (goal.target_error == 0 || ratio <= 1 || paths >= goal.paths) return counted;
-        const double wanted = std::max(2.0, 1.05 * ratio * ratio) * static_cast<double>(paths);
+        // An error of few counts is rough: no more than 64 times as many at once.
+        const double wanted = std::clamp(1.05 * ratio * ratio, 2.0, 64.0) * static_cast<double>(paths);
         paths = static_cast<std::uint64_t>(std::min(wanted, static_cast<double>(goal.paths)));
     }
 }
@@ -131,7 +133,8 @@ auto solve_cells(const Request& request, bool grids_reach, double target_error, 
         if (!(worst(finer) < worst(solved))) break;
         solved = std::move(finer);
     }
-    if (request.method == Method::deterministic) return solved;
+    // Walks have no deadline: with a budget grids are what there is.
+    if (request.method == Method::deterministic || request.time_budget > 0) return solved;
     for (std::size_t i = 0; i < count_of_cells; ++i) {
         if (worst_error(solved[i]) <= error_of_paths(solved[i], goal)) continue;
         auto traced = walk(i, goal).profile;

@@ -48,7 +48,7 @@ class Programs(unittest.TestCase):
     def test_wrong_words_are_status_2(self):
         for words in (["--sigma-range", "2:1"], ["--sigma-range", "x"], ["--bins", "7"], ["--bins", "0"],
                       ["--g-range", "0:1"], ["--h-range", "0:2"], ["--theta-range", "0:91"], ["--table", "both!"],
-                      ["--paths", "0"], ["--paths", "-5"], ["--absorption-range", "-1:2"], ["--nonsense"], ["--method", "magic"], ["--threads", "-1"]):
+                      ["--paths", "0"], ["--paths", "-5"], ["--paths", "34359738369"], ["--target-error", "1e-6"], ["--absorption-range", "-1:2"], ["--nonsense"], ["--method", "magic"], ["--threads", "-1"]):
             self.fails(2, "medulla-precompute", "-o", self.path("never.h5"), *words, names=[words[0]])
             self.assertFalse(os.path.exists(self.path("never.h5")))
         self.fails(2, "furtable")
@@ -72,7 +72,28 @@ class Programs(unittest.TestCase):
             self.assertEqual(info["tables"]["azimuthal"]["paths"], 0)
         self.fails(2, "medulla-precompute", "--target-error", "0", names=["--target-error"])
         self.fails(2, "medulla-precompute", "--target-error", "0.01", "--paths", "7")
-        self.fails(1, "furtable", "merge", self.path("mc.h5"), self.path("t.h5"), "-o", self.path("no.h5"))
+        status, out, err = run("medulla-precompute", "-o", self.path("mc2.h5"), *coarse[:-1], "0.06", "--method", "mc")
+        self.assertEqual(status, 0, err)
+        self.fails(1, "furtable", "merge", self.path("mc.h5"), self.path("mc2.h5"), "-o", self.path("no.h5"),
+                   names=["target_error"])
+
+    def test_coarse_bounds_give_packs_that_verify(self):
+        for bound in (0.5, 0.1, 0.02):
+            pack = self.path("bound.furpack")
+            self.assertEqual(run("furtable", "compress", self.path("t.h5"), "--max-error", bound, "-o", pack)[0], 0)
+            self.assertEqual(run("furtable", "verify", pack)[0], 0, bound)
+            errors = json.loads(run("furtable", "diff", self.path("t.h5"), pack, "--json")[1])["errors"]
+            for kind in errors.values():  # rounding to 12 bits adds up to 5 %
+                self.assertLessEqual(kind["relative_l2"], 1.05 * bound)
+
+    def test_no_input_is_written_over(self):
+        with open(self.path("t.h5"), "rb") as f:
+            before = f.read()
+        self.fails(1, "furtable", "compress", "t.h5", "--rank", 8, "-o", "t.h5", names=["t.h5"])
+        self.fails(1, "furtable", "export", "t.h5", "--format", "npy", "-o", "./t.h5", names=["t.h5"])
+        with open(self.path("t.h5"), "rb") as f:
+            self.assertEqual(f.read(), before)
+        self.fails(2, "furtable", "export", "t.furpack", "--format", "cpp", "--name", "1x", "-o", "x.hpp", names=["1x"])
 
     def test_time_budget_betters_what_is_coarse(self):
         words = SMALL[:-4] + ["--progress", "none", "--json"]

@@ -332,6 +332,19 @@ TEST_CASE("Far field with the axis is the mean of near fields, and its samples w
         }
         const double mean = sum / samples, error = std::sqrt((squares / samples - mean * mean) / samples);
         CHECK(std::abs(mean - albedo) < 5 * error + 3e-3 * albedo);
+        // Near samples come from the lobe at its absorption: weights stay below the channels' number (docs/bcsdf.md),
+        // where the 2 % floor of another lobe's distribution would let them reach 50.
+        NearField<3> near;
+        near_field(fibre, theta_i, 0.3f, near);
+        NearSampler<3> drawn;
+        drawn.prepare(near);
+        double greatest = 0;
+        for (int i = 0; i < samples; ++i) {
+            const FurSample<3> s = drawn.sample({next(), next(), next(), next(), next()});
+            if (s.valid) greatest = std::max(greatest, double(s.weight[1]));
+        }
+        CHECK(greatest > 0);
+        CHECK(greatest < 3);
     }
 }
 

@@ -151,9 +151,9 @@ MEDULLA_FN FurStatus prepare(const FurParameters<Channels>& p, const PackView& p
 inline constexpr float widest_root_range = 1.4f;
 
 /// Multiplies the material's tables out into `tables`, which `fibre` then reads instead of the factors; takes about
-/// 1 ms with the default pack. false, and nothing is changed for the fibre, where they do not fit: longer or fewer than
-/// 3 spans of an axis, longitudinal tables on different axes, an axis of absorption, eta so near 1 that sigma's range
-/// is wide.
+/// 1 ms with the default pack. false, and the fibre reads its factors, where they do not fit: longer or fewer than 3
+/// spans of an axis, longitudinal tables on different axes or not up to 90 degrees, an axis of absorption, a sigma axis
+/// that begins above the material's, eta so near 1 that sigma's range is wide.
 template <int Channels>
 MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexcept {
     fibre.tables = nullptr;
@@ -170,7 +170,8 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
     };
     const float low = held(std::sqrt(sigma_at(1))), high = held(std::sqrt(sigma_at(0)));
     if (offset.spans > most_offset_spans || theta.spans < 3 || theta.spans > most_inclination_spans ||
-        phi.spans > most_exit_spans || theta_r.spans > most_exit_spans || high > widest_root_range * low)
+        phi.spans > most_exit_spans || theta_r.spans > most_exit_spans || high > widest_root_range * low ||
+        low < sigma.lower() || theta.upper() < 1)
         return false;
     tables.offset.set_spline(offset);
     tables.inclination.set_nodes(theta);

@@ -127,7 +127,9 @@ struct NearSampler {
         if (!field.scattered) return;
         const MaterialTable& table = field.fibre->azimuthal;
         Contraction contracted;
-        contract(table, field.longitudinal.sigma, field.offset, contracted);
+        const float* weight = weights_at(table, field.longitudinal.absorbed, contracted.weight);
+        contract(table, weight, sigma_point(table, field.longitudinal.sigma), last_point(table, field.offset),
+                 contracted);
         distribute(table.view, contracted, azimuth);
         longitude.prepare(*field.fibre, field.longitudinal);
     }

@@ -28,8 +28,8 @@ std::uint64_t expected_cost(const Request& request, const SliceId& id) {
     double cost = 0;
     if (request.method == Method::automatic || request.method == Method::deterministic) {
         // Fitted to scripts/measure-slices, sigma <= 16, g <= 0.95: within a factor 2 of each slice.
-        const double peak = 1 / (1 - (g < 0 ? -g : g)), squared = peak * peak;
-        cost += disc ? 2e4 + 1.8e3 * squared + 2 * sigma / (16 + sigma) * (2.2e5 + 5e3 * squared) : 1e4 + 250 * squared;
+        const double peak = 1 / (1 - (g < 0 ? -g : g));
+        cost += disc ? 2e4 + 60 * peak * peak + (550 + 85 * peak) * sigma * sigma : 1e4 + 150 * peak * peak;
         cost *= absorptions;  // each is a solve; paths answer for all of them at once
     }
     if (request.method == Method::analog || request.method == Method::mc)

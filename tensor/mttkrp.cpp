@@ -1,4 +1,4 @@
-// Blocked MTTKRP: each block of the tensor meets a block of Khatri-Rao rows made on the spot, in one GEMM.
+// Blocked MTTKRP: each block of the tensor meets a block of Khatri-Rao rows made on the spot, in one product.
 // Phan, Tichavsky, Cichocki 2013, "Fast alternating LS algorithms ...", for the split into two sides.
 #include "tensor/mttkrp.hpp"
 
@@ -72,7 +72,7 @@ RowMatrix SplitTensor::down(const Factors& factors, double scale) const {
         for (Eigen::Index from = 0; from < columns_; from += terms_per_block) {
             const Eigen::Index length = std::min(terms_per_block, columns_ - from);
             khatri_rao_rows(factors, split_, shape_.size(), from, length, terms);
-            result.middleRows(row, count).noalias() += tensor.block(row, from, count, length) * terms;
+            add_product(tensor.block(row, from, count, length), terms, result.middleRows(row, count));
         }
         result.middleRows(row, count) *= scale;
     }
@@ -91,7 +91,7 @@ RowMatrix SplitTensor::across(const Factors& factors, double scale) const {
         for (Eigen::Index from = 0; from < rows_; from += terms_per_block) {
             const Eigen::Index length = std::min(terms_per_block, rows_ - from);
             khatri_rao_rows(factors, 0, split_, from, length, terms);
-            result.middleRows(column, count).noalias() += tensor.block(from, column, length, count).transpose() * terms;
+            add_product(tensor.block(from, column, length, count).transpose(), terms, result.middleRows(column, count));
         }
         result.middleRows(column, count) *= scale;
     }
@@ -132,7 +132,7 @@ double SplitTensor::residual_squared(const Factors& factors, const Eigen::Vector
         for (Eigen::Index from = 0; from < columns_; from += terms_per_block) {
             const Eigen::Index length = std::min(terms_per_block, columns_ - from);
             khatri_rao_rows(factors, split_, shape_.size(), from, length, right);
-            model.noalias() = left * right.transpose();
+            multiply(left, right.transpose(), model);
             sum += (scale * tensor.block(row, from, count, length) - model).squaredNorm();
         }
         sums[static_cast<std::size_t>(chunk)] = sum;

@@ -1,15 +1,14 @@
 // The matricised tensor times Khatri-Rao product (MTTKRP): the one costly step of every CP solver, for all modes at
-// about the price of two. Rests on Eigen and OpenMP; internal to this folder.
+// about the price of two. Rests on product.hpp and OpenMP; internal to this folder.
 #pragma once
 
-#include <Eigen/Dense>
 #include <cstddef>
 #include <vector>
 
+#include "tensor/product.hpp"
+
 namespace medulla::tensor {
 
-/// Row-major: the entries of one node for all components lie side by side.
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 /// One per mode, shape[k] x rank.
 using Factors = std::vector<RowMatrix>;
 

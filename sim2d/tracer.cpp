@@ -73,12 +73,7 @@ class Estimate {
     std::vector<Lobe> lobes(const std::vector<TracerSums>& sums) const {
         const std::size_t count = sums.size();
         const Paid paid = paid_by(sums, [](const TracerSums& s) { return s.bins; });
-        // The multiply scattered share is known: 1 - single. Where that difference holds no digits, the sum is scaled.
-        const double known = 1 - single_share_;
-        Scale scale;
-        scale.exact = known > kKnown && paid.all > 0;
-        scale.paid = scale.exact ? known / paid.all : 1 / (single_share_ + paid.all);
-        scale.single = scale.exact ? 1 : scale.paid;
+        const Scale scale = scale_of(paid.all);
         std::vector<Lobe> out;
         for (const Side side : sides_) out.push_back(lobe_of(side, single_, paid, paid, scale));
         if (sides_.size() == 1) out[0].share_error = 0;
@@ -110,11 +105,16 @@ class Estimate {
         std::vector<double> mean, total;
         double all = 0;
     };
-    /// Factors of what is paid and of singly scattered light; `exact`: the first makes paid light the known share.
+    /// Factors of what is paid and of singly scattered light.
     struct Scale {
-        bool exact = false;
-        double paid = 1, single = 1;
+        double paid, single;
     };
+    /// The multiply scattered share is known: 1 - single. Where that difference holds no digits, the sum is scaled.
+    Scale scale_of(double all) const {
+        const double known = 1 - single_share_;
+        if (known > kKnown && all > 0) return {known / all, 1};
+        return {1 / (single_share_ + all), 1 / (single_share_ + all)};
+    }
 
     template <class Bins>
     Paid paid_by(const std::vector<TracerSums>& sums, Bins&& bins_of) const {
@@ -143,27 +143,32 @@ class Estimate {
             lobe.density.push_back(scale.single * single[b] + scale.paid * paid.mean[b]);
             lobe.share += lobe.density.back() * width_;
         }
-        double squares = 0, variance = 0, share_variance = 0;
+        double squares = 0;
         for (double& d : lobe.density) d /= lobe.share, squares += d * d;
-        // First-order deviations of the quotients above, per randomisation.
-        std::vector<double> deviation(lobe.density.size());
+        // The jackknife: what the same quotients are without each randomisation in turn. Their first-order deviations
+        // alone understate the error of few walks, where what is paid is skew (Efron & Stein 1981: the jackknife does
+        // not, on average).
+        const double n = static_cast<double>(count);
+        const auto without = [n](double mean, double part) { return mean + (mean - part) / (n - 1); };
+        double variance = 0, share_variance = 0;
+        std::vector<double> other(lobe.density.size());
         for (std::size_t r = 0; r < count; ++r) {
-            double drift = 0;
-            for (std::size_t i = 0; i < deviation.size(); ++i) {
+            const Scale scale_r = scale_of(without(base.all, base.total[r]));
+            double share = 0;
+            for (std::size_t i = 0; i < other.size(); ++i) {
                 const std::size_t b = side.first + i;
-                const double shape = scale.exact ? paid.mean[b] / base.all : lobe.density[i] * lobe.share;
-                deviation[i] = scale.paid * (paid.part[r][b] - paid.mean[b] - shape * (base.total[r] - base.all));
-                drift += deviation[i] * width_;
+                other[i] = scale_r.single * single[b] + scale_r.paid * without(paid.mean[b], paid.part[r][b]);
+                share += other[i] * width_;
             }
-            share_variance += drift * drift;
-            for (std::size_t i = 0; i < deviation.size(); ++i) {
-                const double e = (deviation[i] - lobe.density[i] * drift) / lobe.share;
+            share_variance += (share - lobe.share) * (share - lobe.share);
+            for (std::size_t i = 0; i < other.size(); ++i) {
+                // A lobe that one randomisation alone paid into is nothing without it: off by all of itself.
+                const double e = (share > 0 ? other[i] / share : 0) - lobe.density[i];
                 variance += e * e;
             }
         }
-        const double n = static_cast<double>(count), pairs = n * (n - 1);
-        lobe.share_error = std::sqrt(share_variance / pairs);
-        lobe.standard_error = std::sqrt(variance / pairs / squares + kRounding * kRounding);
+        lobe.share_error = std::sqrt(share_variance * (n - 1) / n);
+        lobe.standard_error = std::sqrt(variance * (n - 1) / n / squares + kRounding * kRounding);
         return lobe;
     }
 

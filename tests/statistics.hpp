@@ -1,6 +1,7 @@
-// The few statistics that tests share: chi-squared tail and z-scores of histograms.
+// The few statistics that tests share: chi-squared tail, Student's t, z-scores of histograms.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -26,6 +27,21 @@ inline double chi_squared_p(const std::vector<double>& counts, const std::vector
         pooled_count = pooled_expected = 0;
     }
     return chi_squared_tail(x, cells - 1);
+}
+
+/// Two-sided p-value of Student's t with an odd number of degrees of freedom (Abramowitz and Stegun 26.7.3).
+inline double student_p(double t, int freedom) {
+    const double theta = std::atan(std::abs(t) / std::sqrt(double(freedom))), c = std::cos(theta);
+    double sum = 0, term = c;
+    for (int k = 3; k <= freedom; term *= (k - 1.0) / k * c * c, k += 2) sum += term;
+    return 1 - 2 / 3.14159265358979323846 * (theta + std::sin(theta) * sum);
+}
+
+/// p-value of p-values that are even in (0, 1), by `classes` classes.
+inline double evenness_p(const std::vector<double>& p, std::size_t classes) {
+    std::vector<double> counts(classes, 0.0);
+    for (const double x : p) counts[std::min(classes - 1, static_cast<std::size_t>(x * double(classes)))] += 1;
+    return chi_squared_p(counts, std::vector<double>(classes, 1 / double(classes)), double(p.size()));
 }
 
 }  // namespace medulla::test

@@ -141,6 +141,29 @@ TEST_CASE("Standard errors are those of independent repetitions against the dete
     CHECK(std::abs(m.mean) < 5 * m.error + 0.02);
 }
 
+TEST_CASE("Stated errors stand a chi-squared test, whatever ends a run", "[tracer]") {
+    // The slab's back energy over its stated error is Student's t of fifteen degrees, from sixteen randomisations:
+    // p-values of independent repetitions are even. Ending at a target picks runs that look good; they must stand too.
+    // Three tests at 1e-3.
+    const double theta = 0.6;
+    for (const TracerOptions& o : {options(1024), options(16384), options(1 << 20, 1, 0.03)}) {
+        std::vector<double> p;
+        for (const double g : {-0.5, 0.3, 0.8}) {
+            const SlabSolver solver(g);
+            for (const double sigma : {0.5, 2.0, 8.0}) {
+                const double exact = solver.solve(sigma, {theta}, 24)[0].back.energy;
+                TracerOptions run = o;
+                for (run.seed = 1; run.seed <= 120; ++run.seed) {
+                    const Profile back = trace_expected_slab(sigma, g, theta, 24, run).profile.back;
+                    p.push_back(test::student_p((back.energy - exact) / back.energy_error, 15));
+                }
+            }
+        }
+        INFO("paths " << o.paths << " target " << o.target_error << " of " << p.size());
+        CHECK(test::evenness_p(p, 20) > 1e-3);
+    }
+}
+
 TEST_CASE("Mean path length: isotropic light on the disc pi / 2, on the slab pi, for every sigma and g", "[tracer]") {
     // Blanco and Fournier 2003: pi area / perimeter in the plane. Scattered and unscattered light together.
     const GaussRule rule = unit_gauss_rule(24);

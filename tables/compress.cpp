@@ -5,16 +5,16 @@
 #include <cmath>
 #include <ctime>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "tables/error.hpp"
-#include "tables/parts.hpp"
 
 namespace medulla::tables {
 namespace {
 
 constexpr int rank_step = static_cast<int>(rank_multiple), greatest_rank = static_cast<int>(max_rank);
 /// Of the energies: more rank is only rounding. The slab's have three small axes, the disc's with absorption four.
-int energy_rank(const Part& part) { return part.kind == TableKind::survival ? 48 : 24; }
+int energy_rank(const Part& part) { return part.kind == TableKind::survival ? 48 : 32; }
 /// Of the solves that say how hard each part is.
 constexpr int pilot_rank = 32;
 /// Room kept for the provenance text when a pack must fit into a number of bytes.
@@ -59,6 +59,7 @@ void run(Solves& solves, const CompressOptions& options, bool pilot) {
         settings.rank = solve.rank;
         settings.seed = options.seed;
         if (pilot) settings.restarts = 1;
+        if (!solve.part->lobes()) settings.max_sweeps = 400;  // small, and nothing else states these energies
         // The slab's energies are no densities: nothing asks their factors to be non-negative.
         const bool signed_factors = !solve.part->lobes() && options.solver == tensor::Solver::nonnegative;
         solve.result = tensor::cp(solve.part->values, signed_factors ? tensor::Solver::lm : options.solver, settings);
@@ -158,6 +159,31 @@ void share_bytes(Solves& solves, std::size_t bytes) {
         if (best == solves.size()) return;
         solves[best].rank += rank_step;
     }
+}
+
+/// Rows of exit splines that are far finer than a kind's expected error are bytes that more components use better:
+/// takes the coarsest of a few splines that leave a third of it. What a pilot said of a part holds for its coarser one.
+/// @param shared ranks that bytes were shared out to   @param pilots those of changed parts lose their models
+/// @return whether any changed
+bool coarsen_exits(const Tables& tables, const ExitSpans& spans, std::vector<Part>& parts, const Solves& shared,
+                   Solves& pilots) {
+    bool changed = false;
+    for (const auto& [first, last] : kinds_of(pilots)) {
+        const TableKind kind = parts[first].kind;
+        if (!is_lobe(kind)) continue;
+        double expected = 0;
+        for (std::size_t i = first; i < last; ++i) expected = std::hypot(expected, pilots[i].expected(shared[i].rank));
+        for (std::size_t eighths = 7; eighths >= 4; --eighths) {
+            std::vector<Part> coarse = lobe_parts_of(tables, kind, spans[kind] * eighths / 8);
+            double exit = 0;
+            for (const Part& part : coarse) exit = std::hypot(exit, part.exit_error);
+            if (exit > expected / 3 || coarse.size() != last - first) break;
+            std::move(coarse.begin(), coarse.end(), parts.begin() + static_cast<std::ptrdiff_t>(first));
+            for (std::size_t i = first; i < last; ++i) pilots[i].result = {};
+            changed = true;
+        }
+    }
+    return changed;
 }
 
 double kind_error(const Solves& solves, std::size_t first, std::size_t last) {
@@ -283,15 +309,25 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 CompressResult compress(const Tables& tables, const CompressOptions& options, const std::string& input) {
     const auto start = std::chrono::steady_clock::now();
     const std::clock_t cpu_start = std::clock();
-    const std::vector<Part> parts = (options.solver == tensor::Solver::nonnegative ? whole_lobes_of : parts_of)(
-        tables, options.phi_spans, options.theta_spans);
+    std::vector<Part> parts =
+        (options.solver == tensor::Solver::nonnegative ? whole_lobes_of : parts_of)(tables, options.spans);
     Solves solves;
     const bool searched = options.max_error || options.max_bytes;
     const int rank = searched ? pilot_rank : options.rank;
     for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank(part)});
     if (searched) run(solves, options, true);
     if (options.max_error) solve_to(solves, *options.max_error, options);
-    if (options.max_bytes) share_bytes(solves, *options.max_bytes);
+    if (options.max_bytes) {
+        const Solves pilots = solves;
+        share_bytes(solves, *options.max_bytes);
+        if (options.solver != tensor::Solver::nonnegative) {
+            const Solves shared = std::exchange(solves, pilots);
+            if (coarsen_exits(tables, options.spans, parts, shared, solves))
+                share_bytes(solves, *options.max_bytes);
+            else
+                solves = shared;
+        }
+    }
     run(solves, options, false);
     CompressResult result;
     std::vector<PackedTable> packed;

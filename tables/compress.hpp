@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tables/pack_degeneracy.hpp"
+#include "tables/parts.hpp"
 #include "tables/source.hpp"
 #include "tables/spline.hpp"
 #include "tensor/cp.hpp"
@@ -18,7 +19,7 @@ struct CompressOptions {
     int rank = 16;                         ///< components of each part, at most max_rank / 2
     std::optional<double> max_error;       ///< instead: the smallest pack whose every kind keeps this relative L2
     std::optional<std::size_t> max_bytes;  ///< instead: the least error within this many bytes
-    std::size_t phi_spans = 128, theta_spans = 128;  ///< exit splines over the full circle and the half circle
+    ExitSpans spans;                       ///< with max_bytes: the most; fewer where they are not what errors are of
     tensor::Solver solver = tensor::Solver::lm;
     std::uint64_t seed = 1;
 };

@@ -193,41 +193,52 @@ std::vector<double> exit_breakpoints(TableKind kind, std::size_t bins, std::size
 
 namespace {
 
-/// add(table, kind, lobes, their norm, spans) for every kind of lobe, in the order of a pack.
-template <class Add>
-void for_kinds(const Tables& tables, std::size_t phi_spans, std::size_t theta_spans, Add add) {
-    const auto one = [&](const Table& table, TableKind kind, std::size_t spans) {
-        const std::vector<double> lobes = side_lobes(table, kind == TableKind::longitudinal_forward ? 1 : 0);
-        const auto n = static_cast<Eigen::Index>(lobes.size());
-        add(table, kind, lobes, Eigen::Map<const Eigen::VectorXd>(lobes.data(), n).norm(), spans);
-    };
-    if (tables.azimuthal) one(*tables.azimuthal, TableKind::azimuthal, phi_spans);
-    if (tables.longitudinal)
-        for (const TableKind kind : {TableKind::longitudinal_back, TableKind::longitudinal_forward})
-            one(*tables.longitudinal, kind, theta_spans);
+/// Lobes of one kind and their norm.
+struct KindLobes {
+    const Table& table;
+    std::vector<double> lobes;
+    double whole;
+};
+KindLobes lobes_of(const Tables& tables, TableKind kind) {
+    const Table& table = kind == TableKind::azimuthal ? *tables.azimuthal : *tables.longitudinal;
+    std::vector<double> lobes = side_lobes(table, kind == TableKind::longitudinal_forward ? 1 : 0);
+    const double norm = Eigen::Map<const Eigen::VectorXd>(lobes.data(), static_cast<Eigen::Index>(lobes.size())).norm();
+    return {table, std::move(lobes), norm};
+}
+
+bool has(const Tables& tables, TableKind kind) {
+    return (kind == TableKind::azimuthal ? tables.azimuthal : tables.longitudinal).has_value();
 }
 
 }  // namespace
 
-std::vector<Part> parts_of(const Tables& tables, std::size_t phi_spans, std::size_t theta_spans) {
+std::vector<Part> lobe_parts_of(const Tables& tables, TableKind kind, std::size_t spans) {
+    const KindLobes all = lobes_of(tables, kind);
     std::vector<Part> parts;
-    for_kinds(tables, phi_spans, theta_spans,
-              [&](const Table& table, TableKind kind, const auto& lobes, double whole, std::size_t spans) {
-                  for (const Mirror mirror : {Mirror::even, Mirror::odd}) {
-                      Part part = lobe_part(table, kind, mirror, lobes, whole, spans);
-                      if (mirror == Mirror::even || part.share > 1e-6) parts.push_back(std::move(part));
-                  }
-              });
+    for (const Mirror mirror : {Mirror::even, Mirror::odd}) {
+        Part part = lobe_part(all.table, kind, mirror, all.lobes, all.whole, spans);
+        if (mirror == Mirror::even || part.share > 1e-6) parts.push_back(std::move(part));
+    }
+    return parts;
+}
+
+std::vector<Part> parts_of(const Tables& tables, const ExitSpans& spans) {
+    std::vector<Part> parts;
+    for (const TableKind kind : lobe_kinds) {
+        if (!has(tables, kind)) continue;
+        for (Part& part : lobe_parts_of(tables, kind, spans[kind])) parts.push_back(std::move(part));
+    }
     add_energies(tables, parts);
     return parts;
 }
 
-std::vector<Part> whole_lobes_of(const Tables& tables, std::size_t phi_spans, std::size_t theta_spans) {
+std::vector<Part> whole_lobes_of(const Tables& tables, const ExitSpans& spans) {
     std::vector<Part> parts;
-    for_kinds(tables, phi_spans, theta_spans,
-              [&](const Table& table, TableKind kind, const auto& lobes, double whole, std::size_t spans) {
-                  parts.push_back(whole_part(table, kind, lobes, whole, spans));
-              });
+    for (const TableKind kind : lobe_kinds) {
+        if (!has(tables, kind)) continue;
+        const KindLobes all = lobes_of(tables, kind);
+        parts.push_back(whole_part(all.table, kind, all.lobes, all.whole, spans[kind]));
+    }
     add_energies(tables, parts);
     return parts;
 }

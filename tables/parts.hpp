@@ -38,14 +38,28 @@ struct Part {
 /// circle: dense where lobes are narrow (docs/formats.md).
 std::vector<double> exit_breakpoints(TableKind kind, std::size_t bins, std::size_t spans);
 
-/// The parts of every kind of lobe in the tables, of the slab's energies, and of what absorption leaves of the disc's:
-/// even before odd, kinds in the order of a pack. A part that is nothing but float rounding of its lobes is left out.
-/// @param spans of the exit spline over the full axis, see CompressOptions
-std::vector<Part> parts_of(const Tables& tables, std::size_t phi_spans, std::size_t theta_spans);
+/// Spans of the exit splines over the full circle and the half circles.
+struct ExitSpans {
+    std::size_t azimuthal = 96, longitudinal_back = 128, longitudinal_forward = 128;
+
+    std::size_t& operator[](TableKind kind) {
+        return kind == TableKind::azimuthal           ? azimuthal
+               : kind == TableKind::longitudinal_back ? longitudinal_back
+                                                      : longitudinal_forward;
+    }
+    std::size_t operator[](TableKind kind) const { return const_cast<ExitSpans&>(*this)[kind]; }
+};
+
+/// The parts of one kind of lobe: even before odd. A part that is nothing but float rounding of its lobes is left out.
+std::vector<Part> lobe_parts_of(const Tables& tables, TableKind kind, std::size_t spans);
+
+/// The parts of every kind of lobe in the tables, of the slab's energies, and of what absorption leaves of the disc's;
+/// kinds in the order of a pack.
+std::vector<Part> parts_of(const Tables& tables, const ExitSpans& spans);
 
 /// The same for factors >= 0: whole lobes. Errors of a model against these values are those of the table but for the
 /// condition of the B-spline bases (a factor of two or so).
-std::vector<Part> whole_lobes_of(const Tables& tables, std::size_t phi_spans, std::size_t theta_spans);
+std::vector<Part> whole_lobes_of(const Tables& tables, const ExitSpans& spans);
 
 /// Joins the models of one kind's parts (even first) into a table of the pack.
 PackedTable join(const std::vector<const Part*>& parts, const std::vector<const tensor::CpModel*>& models,

@@ -298,7 +298,7 @@ Counts mutate_packs(std::uint64_t count, std::uint64_t seed) {
     CompressOptions options;
     options.rank = 4;
     options.solver = tensor::Solver::als;
-    options.phi_spans = options.theta_spans = 8;
+    options.spans = {8, 8, 8};
     Bytes good = compress(simulate(small_request(), ProgressMode::none), options, "mutate").pack;
     Counts counts;
     std::uint64_t mended = 0, mended_opened = 0;

@@ -20,6 +20,7 @@ struct CompressWords {
     std::size_t max_bytes = 0;
     std::uint64_t seed = 1;
     bool nonnegative = false, json = false;
+    std::optional<int> sweeps;
 };
 
 const char* mirror_name(Mirror mirror) {
@@ -66,6 +67,7 @@ void run_compress(const CompressWords& words) {
     CompressOptions options;
     if (words.rank) options.rank = *words.rank;
     options.seed = words.seed;
+    options.max_sweeps = words.sweeps;
     options.solver = words.solver == "als" ? tensor::Solver::als : tensor::Solver::lm;
     if (words.nonnegative) options.solver = tensor::Solver::nonnegative;
     if (words.max_error > 0) options.max_error = words.max_error;
@@ -233,6 +235,10 @@ void add_compress(CLI::App& app, Action& action) {
                           "factors >= 0: each component is a density; by coordinate descent")
                 ->excludes("--solver");
             command.add_option("--seed", words.seed, "of the solver's start")->capture_default_str();
+            command
+                .add_option("--sweeps", words.sweeps,
+                            "most steps of a solve (default: of lm 100, of als 500); more leave a little less error")
+                ->check(CLI::Range(1, 100000));
             command.add_flag("--json", words.json, "print one JSON object");
         },
         run_compress);

@@ -22,6 +22,7 @@ struct CompressOptions {
     ExitSpans spans;                       ///< with max_bytes: the most; fewer where they are not what errors are of
     tensor::Solver solver = tensor::Solver::lm;
     std::uint64_t seed = 1;
+    std::optional<int> max_sweeps;  ///< most steps of each solve but the pilots; unset: the solver's own
 };
 
 struct PartReport {

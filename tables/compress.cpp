@@ -62,7 +62,8 @@ void run(Solves& solves, const CompressOptions& options, bool pilot) {
             settings.restarts = 1;
         else
             settings.max_sweeps = options.max_sweeps;
-        if (!solve.part->lobes()) settings.max_sweeps = std::max(400, options.max_sweeps.value_or(0));  // small, and nothing else states these energies
+        // Energies are small to solve, and nothing else states them.
+        if (!solve.part->lobes()) settings.max_sweeps = std::max(400, options.max_sweeps.value_or(0));
         // The slab's energies are no densities: nothing asks their factors to be non-negative.
         const bool signed_factors = !solve.part->lobes() && options.solver == tensor::Solver::nonnegative;
         solve.result = tensor::cp(solve.part->values, signed_factors ? tensor::Solver::lm : options.solver, settings);

@@ -266,6 +266,9 @@ TEST_CASE("disc, deterministic: absorption against the analog tracer's one set o
             CHECK(solved.energy_error <= 1e-3 * solved.energy);
             // Lobes: the traced one's standard error is the expected distance; 1.6 times it is 8 sigma for 24 bins.
             CHECK(distance(traced[j].lobe, solved.lobe) < 1.6 * traced[j].standard_error);
+            // And absorption shows. (At sigma = 0 light scatters once, and every absorption leaves the same lobe.)
+            if (absorption[j] >= 0.5 && sigma > 0)
+                CHECK(distance(traced[0].lobe, solved.lobe) > 5 * traced[j].standard_error);
         }
     }
 }

@@ -4,6 +4,8 @@ import json
 import math
 import os
 import re
+import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -347,6 +349,39 @@ class Programs(unittest.TestCase):
         self.assertEqual(status, 0, err)
         self.assertEqual(numpy.load(self.path("a.npy")).shape, (5, 3, 4, 72))
         self.assertEqual(run("furtable", "export", self.path("t.furpack"), "--format", "cpp", "-o", self.path("p.hpp"))[0], 0)
+
+    def test_glsl(self):
+        """Its words are the pack's, and GLSL's own compiler takes it; tests/glsl_values.cpp compares its numbers."""
+        file = self.path("fur.glsl")
+        self.assertEqual(run("furtable", "export", self.path("t.furpack"), "--format", "glsl", "--name", "fox", "-o", file)[0], 0)
+        with open(file) as f:
+            text = f.read()
+        count, words = re.search(r"const uint fox_words\[(\d+)\] = uint\[\d+\]\(([^)]*)\);", text).groups()
+        words = [int(word.rstrip("u"), 16) for word in words.replace("\n", "").split(",")]
+        with open(self.path("t.furpack"), "rb") as f:
+            pack = f.read()
+        self.assertEqual(int(count), len(words))
+        self.assertEqual(struct.pack(f"<{len(words)}I", *words), pack.ljust(4 * len(words), b"\0"))
+        for name in ("gl_fur", "a__b", "fur_"):
+            self.fails(2, "furtable", "export", "t.furpack", "--format", "glsl", "--name", name, "-o", "no.glsl", names=[name])
+        self.fails(1, "furtable", "export", "t.h5", "--format", "glsl", "-o", "no.glsl", names=["t.h5: expected a pack"])
+        if not shutil.which("glslangValidator"):
+            self.skipTest("no glslangValidator (package glslang-tools)")
+        asked = ("fox_azimuthal(1.0, 0.5, 0.3, 1.0) + fox_longitudinal(true, 1.0, 0.4, 0.1, 0.2) + "
+                 "fox_back_fraction(1.0, 0.2, 0.3)")
+        buffer = "layout(std430, binding = 1) readonly buffer Pack { uint pack[]; };\n#define FOX_WORD(i) pack[i]\n"
+        compute = "layout(local_size_x = 64) in;\nlayout(std430, binding = 0) buffer Out { float result[]; };\n"
+        for stage, before, after in (
+                ("comp", "#version 430\n" + compute, f"void main() {{ result[0] = {asked}; }}"),
+                ("comp", "#version 310 es\nprecision highp float;\n" + compute + buffer, f"void main() {{ result[0] = {asked}; }}"),
+                ("frag", "#version 330\nout vec4 colour;\n", f"void main() {{ colour = vec4({asked}); }}"),
+                ("frag", "#version 300 es\nprecision highp float;\nout vec4 colour;\n", f"void main() {{ colour = vec4({asked}); }}")):
+            shader = self.path("shader." + stage)
+            with open(shader, "w") as f:
+                f.write(before + text + after)
+            done = subprocess.run(["glslangValidator", shader], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, (before, done.stdout[-2000:]))
+            self.assertNotIn("WARNING", done.stdout)
 
     def test_axis_of_absorption(self):
         words = ["--table", "azimuthal", "--absorption-range", "0:2:4", *SMALL]

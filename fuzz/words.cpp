@@ -18,6 +18,18 @@ std::vector<std::string> words_of(const unsigned char* data, std::size_t size) {
     return words;
 }
 
+// Declared once, since that takes longer than to parse; CLI11 forgets what it parsed before.
+struct Precompute {
+    CLI::App app{"fuzz"};
+    Words words;
+    Precompute() { declare(app, words); }
+};
+struct Furtable {
+    CLI::App app{"fuzz"};
+    Action action;
+    Furtable() { add_commands(app, action); }
+};
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
@@ -27,18 +39,16 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
         if (word.empty()) return 0;            // refused before they are parsed (tables/program.cpp)
     std::reverse(words.begin(), words.end());  // CLI11 takes a vector from its end
     try {
-        CLI::App app("fuzz");
         if (data[0] % 2 == 0) {
-            Words declared;
-            declare(app, declared);
-            app.parse(words);
-            const Job job = job_of(declared);
+            static Precompute program;
+            program.words = Words();
+            program.app.parse(words);
+            const Job job = job_of(program.words);
             if (job.shard && (job.shard->index < 1 || job.shard->index > job.shard->count)) std::abort();
             check_request(job.request);
         } else {
-            Action action;
-            add_commands(app, action);
-            app.parse(words);
+            static Furtable program;
+            program.app.parse(words);
         }
     } catch (const CLI::Error&) {
     } catch (const Error&) {

@@ -37,11 +37,31 @@ nlohmann::ordered_json colour(const double (&value)[3], bool grey) {
     return {value[0], value[1], value[2]};
 }
 
+/// Says where the pack's axes end before what the fibre asks of them: there the runtime holds to the end.
+void warn_beyond_axes(const FurFibre<3>& fibre, const Longitudinal<3>& at, double offset, const Source& pack,
+                      const std::string& path) {
+    if (!fibre.scattered) return;
+    Parameters asked;
+    asked.sigma = static_cast<double>(at.sigma), asked.g = static_cast<double>(fibre.parameters.g);
+    asked.theta_i = std::abs(static_cast<double>(at.theta_i));
+    asked.h = offset * static_cast<double>(at.at.inverse_index) / static_cast<double>(fibre.parameters.kappa);
+    asked.h = std::min(asked.h, 1.0);  // beyond, light passes the medulla by
+    if (pack.absorbs()) asked.absorption = static_cast<double>(at.absorbed);
+    std::string beyond;
+    for (const TableKind kind : lobe_kinds) {
+        const std::string one = pack.beyond(kind, asked);
+        if (beyond.find(one) == std::string::npos) beyond += (beyond.empty() ? "" : "; ") + one;
+    }
+    if (!beyond.empty())
+        say("furtable", fmt::format("warning: {}: {}: TTs and TRTs are those of the axis's end", path, beyond));
+}
+
 void run_bcsdf(const BcsdfWords& words) {
     for (const auto& [name, degrees] : {std::pair("--theta-i", words.theta_i), std::pair("--theta-r", words.theta_r)})
         if (!(degrees >= -90 && degrees <= 90))
             throw UsageError("{}: expected degrees in [-90, 90], found {:g}", name, degrees);
     if (!std::isfinite(words.phi)) throw UsageError("--phi: expected degrees, found {:g}", words.phi);
+    const double phi = std::remainder(words.phi, 360.0);
     const OffsetRange range = range_of(words);
     Material material;
     if (words.material.empty()) {
@@ -62,8 +82,15 @@ void run_bcsdf(const BcsdfWords& words) {
     const double radians = pi / 180, theta_i = words.theta_i * radians;
     FarField<3> field;
     far_field(fibre, static_cast<float>(theta_i), range, field);
+    if (!field.valid)
+        throw UsageError(
+            "--theta-i: expected degrees within (-90, 90), since light along the fibre meets no section, found {:g}",
+            words.theta_i);
+    warn_beyond_axes(fibre, field.near.longitudinal,
+                     static_cast<double>(std::max(std::abs(range.low), std::abs(range.high))),
+                     *pack_source(bytes, words.pack), words.pack);
     const LobeValues<3> lobes =
-        field.lobes(static_cast<float>(words.theta_r * radians), static_cast<float>(words.phi * radians));
+        field.lobes(static_cast<float>(words.theta_r * radians), static_cast<float>(phi * radians));
     const double cosine = std::cos(theta_i);
     nlohmann::ordered_json json;
     double sum[3] = {};
@@ -133,15 +160,21 @@ void add_bcsdf(CLI::App& app, Action& action) {
             auto* which = command.add_option_group("material")->require_option(1);
             which->add_option("--preset", words.preset, "animal of Table 4 (furtable presets)");
             which->add_option("--material", words.material, "JSON file of one material");
-            command.add_option("--theta-i", words.theta_i, "inclination of the light, degrees")->required();
-            command.add_option("--theta-r", words.theta_r, "inclination of exit, degrees")->required();
-            command.add_option("--phi", words.phi, "azimuth of exit less that of the light, degrees; 0 = back")
+            command.add_option("--theta-i", words.theta_i, "inclination of the light, degrees in (-90, 90)")
+                ->required();
+            command.add_option("--theta-r", words.theta_r, "inclination of exit, degrees in [-90, 90]")->required();
+            command
+                .add_option("--phi", words.phi,
+                            "azimuth of exit less that of the light, degrees; 0 = back, whole turns count for nothing")
                 ->required();
             auto* where = command.add_option_group("offset")->require_option(1);
             words.h_given = where->add_option("--h", words.h, "near field: one offset in [-1, 1]");
             where->add_option("--h-range", words.range, "mean over offsets A:B");
             where->add_flag("--far", words.far, "far field: mean over -1:1");
-            command.add_option("--pack", words.pack, "tables of the scattered lobes")->capture_default_str();
+            command
+                .add_option("--pack", words.pack,
+                            "tables of the scattered lobes; beyond its axes their ends hold, and a warning says so")
+                ->capture_default_str();
             command.add_flag("--json", words.json, "print one JSON object");
         },
         run_bcsdf);

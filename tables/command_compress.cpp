@@ -27,10 +27,14 @@ const char* mirror_name(Mirror mirror) {
     return mirror == Mirror::none ? "whole" : (mirror == Mirror::even ? "even" : "odd");
 }
 
+/// Whether fit_error is the pack's.
+bool is_nonnegative(const TableReport& report) { return report.parts[0].solve.solver == std::string("nonnegative"); }
+
 nlohmann::ordered_json report_json(const TableReport& report) {
-    nlohmann::ordered_json json = {{"relative_l2_of_factors", report.fit_error},
-                                   {"relative_l2_of_exit_spline", report.exit_error},
-                                   {"relative_l2_of_input_noise", report.noise}};
+    nlohmann::ordered_json json = {
+        {is_nonnegative(report) ? "relative_l2_in_pack" : "relative_l2_of_factors", report.fit_error},
+        {"relative_l2_of_exit_spline", report.exit_error},
+        {"relative_l2_of_input_noise", report.noise}};
     for (const PartReport& part : report.parts)
         json["parts"][mirror_name(part.mirror)] = {{"rank", part.rank},
                                                    {"solver", part.solve.solver},
@@ -101,8 +105,9 @@ void run_compress(const CompressWords& words) {
         return;
     }
     for (const TableReport& report : result.tables) {
-        fmt::print("{}: factors {:.3e} relative L2 (exit spline {:.1e}, noise of the table {:.1e})\n",
-                   medulla::tables::name_of(report.kind), report.fit_error, report.exit_error, report.noise);
+        fmt::print("{}: {} {:.3e} relative L2 (exit spline {:.1e}, noise of the table {:.1e})\n",
+                   medulla::tables::name_of(report.kind), is_nonnegative(report) ? "in the pack" : "factors",
+                   report.fit_error, report.exit_error, report.noise);
         for (const PartReport& part : report.parts)
             fmt::print("  {:<8} rank {:>3}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
                        mirror_name(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
@@ -221,9 +226,12 @@ void add_compress(CLI::App& app, Action& action) {
             command.add_option("-o,--output", words.output, "pack to write (default: FILE with .furpack)");
             auto* size = command.add_option_group("size")->require_option(0, 1);
             size->add_option("--rank", words.rank,
-                             "components of each part: lobes have a mirror-even and an odd one (default 16)")
+                             "components of each part: lobes have a mirror-even and an odd one (default 16). A pack "
+                             "stores them padded with zeros to a multiple of 8, so that 4 take the bytes of 8")
                 ->check(CLI::Range(1, static_cast<int>(max_rank / 2)));
-            size->add_option("--max-error", words.max_error, "smallest pack whose factors keep this relative L2")
+            size->add_option("--max-error", words.max_error,
+                             "smallest pack whose factors keep this relative L2 (with --nonnegative: that keeps it); "
+                             "rounding to 12 bits may add a few per cent of it")
                 ->check(CLI::PositiveNumber);
             size->add_option("--max-bytes", words.max_bytes, "least error within this many bytes")
                 ->check(CLI::PositiveNumber);

@@ -24,7 +24,7 @@ void run_merge(const MergeWords& words) {
         fmt::print("{}\n",
                    nlohmann::ordered_json{{"output", words.output}, {"slices", slices}, {"sha256", hash}}.dump());
     else
-        fmt::print("{}: {} slices, SHA-256 of the contents {}\n", words.output, slices, hash);
+        fmt::print("{}: {}, SHA-256 of the contents {}\n", words.output, counted(slices, "slice"), hash);
 }
 
 }  // namespace

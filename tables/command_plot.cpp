@@ -9,6 +9,7 @@
 
 #include "tables/commands.hpp"
 #include "tables/file.hpp"
+#include "tables/glsl.hpp"
 #include "tables/plot.hpp"
 
 extern char** environ;  // POSIX
@@ -186,9 +187,26 @@ std::string npy(const std::string& file, const std::string& name) {
     return out;
 }
 
+/// Names that begin with gl_ or hold two underscores are GLSL's own.
+std::string glsl(const std::string& file, const std::string& name) {
+    if (name.rfind("gl_", 0) == 0 || name.find("__") != std::string::npos || name.back() == '_')
+        throw UsageError("--name: expected no gl_ in front, no two underscores and none at the end, found '{}'", name);
+    const std::vector<unsigned char> bytes = read_pack(file);
+    try {
+        return glsl_source(bytes, name);
+    } catch (const Error& error) {
+        throw Error("{}: {}", file, error.what());
+    }
+}
+
 void run_export(const ExportWords& words) {
     refuse_input(words.output, {words.file});
-    write_file(words.output, words.format == "cpp" ? cpp_header(words.file, words.name) : npy(words.file, words.table));
+    if (words.format == "npy")
+        write_file(words.output, npy(words.file, words.table));
+    else if (words.format == "cpp")
+        write_file(words.output, cpp_header(words.file, words.name));
+    else
+        write_file(words.output, glsl(words.file, words.name));
     fmt::print("{} written\n", words.output);
 }
 
@@ -206,14 +224,17 @@ void add_plot(CLI::App& app, Action& action) {
 
 void add_export(CLI::App& app, Action& action) {
     add_command<ExportWords>(
-        app, action, "export", "a pack as a C++ header, or lobes as a numpy array",
+        app, action, "export", "a pack as a C++ header or as GLSL, or lobes as a numpy array",
         [](CLI::App& command, ExportWords& words) {
-            command.add_option("FILE", words.file, "pack (cpp), or tables file or pack (npy)")->required();
+            command.add_option("FILE", words.file, "pack (cpp, glsl), or tables file or pack (npy)")->required();
             command.add_option("--format", words.format, "of the output")
                 ->required()
-                ->check(CLI::IsMember({"cpp", "npy"}));
+                ->check(CLI::IsMember({"cpp", "glsl", "npy"}));
             command.add_option("-o,--output", words.output, "file to write")->required();
-            command.add_option("--name", words.name, "for cpp: NAME_words and NAME_size in namespace medulla")
+            command
+                .add_option(
+                    "--name", words.name,
+                    "for cpp: NAME_words and NAME_size in namespace medulla; for glsl: what its names begin with")
                 ->check([](const std::string& name) -> std::string {
                     const auto letter = [](char c) {
                         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';

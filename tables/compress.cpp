@@ -48,8 +48,18 @@ struct Solve {
 };
 using Solves = std::vector<Solve>;
 
+PackedTable pack_kind(const Solves& solves, std::size_t first, std::size_t last, std::pair<float, float> range);
+
+/// Relative L2 error of one kind's lobes as a pack gives them: normalised and held at 0.
+double error_in_pack(const Solve& solve, const Source& tables) {
+    std::vector<unsigned char> pack = write_pack({pack_kind({solve}, 0, 1, {0, 0})}, "{}");
+    return compare(tables, *pack_source(std::move(pack), "the new pack")).at(0).relative;
+}
+
 /// Decomposes every part that has a rank and no model of it. Parts are independent: the same bytes for any threads.
-void run(Solves& solves, const CompressOptions& options, bool pilot) {
+/// Non-negative factors, fitted to whole lobes, miss their integral, which the pack mends: its error is theirs.
+void run(Solves& solves, const CompressOptions& options, bool pilot, const Source* tables) {
+    std::vector<char> renewed(solves.size(), 0);
     // Dynamic scheduling takes them in order; the last kinds are the longest.
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t i = solves.size(); i > 0; --i) {
@@ -68,6 +78,12 @@ void run(Solves& solves, const CompressOptions& options, bool pilot) {
         const bool signed_factors = !solve.part->lobes() && options.solver == tensor::Solver::nonnegative;
         solve.result = tensor::cp(solve.part->values, signed_factors ? tensor::Solver::lm : options.solver, settings);
         solve.error = solve.part->share * solve.result.report.relative_error;
+        renewed[i - 1] = solve.part->lobes();
+    }
+    for (std::size_t i = 0; i < solves.size() && tables != nullptr; ++i) {
+        if (!renewed[i]) continue;
+        const double whole = error_in_pack(solves[i], *tables), spline = solves[i].part->exit_error;
+        solves[i].error = std::sqrt(std::max(0.0, whole * whole - spline * spline));
     }
 }
 
@@ -143,16 +159,15 @@ void share_bytes(Solves& solves, std::size_t bytes) {
         set(lambda);
         return pack_bytes(solves) <= bytes;
     };
-    if (!fits(0))
-        throw Error("--max-bytes: expected at least {} for these tables, found {}", pack_bytes(solves), bytes);
+    if (!fits(0)) return;  // the least ranks there are; compress() says whether their pack is too large
     set(greatest(fits));
     // What rounding down left over goes where it helps most.
     for (;;) {
         std::size_t best = solves.size();
         double most = 0;
         for (std::size_t i = 0; i < solves.size(); ++i) {
-            if (!solves[i].part->lobes() || stored_rank(solves, solves[i].part->kind) + rank_step > greatest_rank)
-                continue;
+            const int step = rank_step * solves[i].part->copies();
+            if (!solves[i].part->lobes() || stored_rank(solves, solves[i].part->kind) + step > greatest_rank) continue;
             const double now = pilot[i].expected(solves[i].rank), then = pilot[i].expected(solves[i].rank + rank_step);
             const double gain = (now * now - then * then) / static_cast<double>(solves[i].part->component_bytes());
             if (gain <= most) continue;
@@ -199,7 +214,7 @@ double kind_error(const Solves& solves, std::size_t first, std::size_t last) {
 
 /// Least ranks on the steps of the format that keep `error`: predicted from the last solve, solved, and predicted again
 /// until the prediction stands.
-void solve_to(Solves& solves, double error, const CompressOptions& options) {
+void solve_to(Solves& solves, double error, const CompressOptions& options, const Source* tables) {
     for (const auto& [first, last] : kinds_of(solves)) {
         if (!solves[first].part->lobes()) {
             solves[first].rank = energy_rank(*solves[first].part);
@@ -212,6 +227,8 @@ void solve_to(Solves& solves, double error, const CompressOptions& options) {
             throw Error("--max-error: the exit splines of the {} leave {:.2e}, expected {:.2e}",
                         name_of(solves[first].part->kind), std::sqrt(spline), error);
         Solves best;
+        // Components are counted as they are stored: whole non-negative lobes take two for each.
+        const int copies = solves[first].part->copies(), step = rank_step * copies;
         int least = 2 * greatest_rank, floor = 0;
         for (int tries = 0; tries < 8; ++tries) {
             Solves next(solves.begin() + static_cast<std::ptrdiff_t>(first),
@@ -228,22 +245,23 @@ void solve_to(Solves& solves, double error, const CompressOptions& options) {
             int total = 0;
             for (Solve& solve : next) {
                 solve.rank = rank_step * static_cast<int>(std::ceil(share_of(solve, lambda) / rank_step));
-                solve.rank = std::clamp(solve.rank, rank_step, greatest_rank - rank_step);
-                total += solve.rank;
+                const int others = rank_step * static_cast<int>(next.size() - 1);
+                solve.rank = std::clamp(solve.rank, rank_step, greatest_rank / copies - others);
+                total += solve.rank * copies;
             }
             // Between a total that was too small and one that was enough there is nothing left to try.
-            if (total >= least || total > greatest_rank) total = std::min(least - rank_step, greatest_rank);
+            if (total >= least || total > greatest_rank) total = std::min(least - step, greatest_rank);
             // Every part keeps components: without any it would be all error.
-            if (total <= floor || total < rank_step * static_cast<int>(next.size())) break;
+            if (total <= floor || total < step * static_cast<int>(next.size())) break;
             while (stored_rank(next, next[0].part->kind) > total)
                 std::max_element(next.begin(), next.end(), [](const Solve& a, const Solve& b) {
                     return a.rank < b.rank;
                 })->rank -= rank_step;
-            run(next, options, false);
+            run(next, options, false, tables);
             std::copy(next.begin(), next.end(), solves.begin() + static_cast<std::ptrdiff_t>(first));
             if (kind_error(solves, first, last) <= error) {
                 least = total, best = next;
-                if (least - rank_step <= floor) break;
+                if (least - step <= floor) break;
             } else {
                 floor = total;
                 if (total >= greatest_rank) break;
@@ -319,8 +337,10 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
     const bool searched = options.max_error || options.max_bytes;
     const int rank = searched ? pilot_rank : options.rank;
     for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank(part)});
-    if (searched) run(solves, options, true);
-    if (options.max_error) solve_to(solves, *options.max_error, options);
+    std::unique_ptr<Source> source;
+    if (options.solver == tensor::Solver::nonnegative) source = table_source(tables);
+    if (searched) run(solves, options, true, source.get());
+    if (options.max_error) solve_to(solves, *options.max_error, options, source.get());
     if (options.max_bytes) {
         const Solves pilots = solves;
         share_bytes(solves, *options.max_bytes);
@@ -332,7 +352,7 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
                 solves = shared;
         }
     }
-    run(solves, options, false);
+    run(solves, options, false, source.get());
     CompressResult result;
     std::vector<PackedTable> packed;
     for (const auto& [first, last] : kinds_of(solves)) {
@@ -340,10 +360,14 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
         result.tables.push_back(report_of(solves, first, last, tables));
     }
     result.pack = write_pack(packed, provenance(tables, options, input, result.tables));
+    if (options.max_bytes && result.pack.size() > *options.max_bytes)
+        throw Error("--max-bytes: expected at least {} for these tables, found {}", result.pack.size(),
+                    *options.max_bytes);
     result.solve_seconds = seconds_since(start);
     result.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
     result.degeneracy = degeneracy_of(open_pack(result.pack.data(), result.pack.size()).pack);
-    result.errors = compare(*table_source(tables), *pack_source(result.pack, "the new pack"));
+    if (!source) source = table_source(tables);
+    result.errors = compare(*source, *pack_source(result.pack, "the new pack"));
     result.seconds = seconds_since(start);
     return result;
 }

@@ -35,7 +35,9 @@ struct PartReport {
 struct TableReport {
     TableKind kind;
     std::vector<PartReport> parts;
-    double fit_error = 0;   ///< relative L2 of the factors against the table, before rounding and normalisation
+    /// Relative L2 against the table: of the factors before rounding and normalisation; of non-negative ones, which
+    /// normalisation brings much nearer, in the pack.
+    double fit_error = 0;
     double exit_error = 0;  ///< part of it that the exit spline leaves
     double noise = 0;       ///< relative L2 standard error of the table itself
 };

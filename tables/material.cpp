@@ -19,43 +19,61 @@ std::string read_text(const std::string& path) {
     return {bytes.begin(), bytes.end()};
 }
 
+/// A value as it is quoted in a message.
+std::string quoted(const json& value) { return value.dump().substr(0, 40); }
+
 double number(const json& value, const std::string& field) {
-    if (!value.is_number()) throw Error("{}: expected a number, found {}", field, value.dump().substr(0, 40));
+    if (!value.is_number()) throw Error("{}: expected a number, found {}", field, quoted(value));
     return value.get<double>();
 }
 
-Material material_of(const json& entry, const std::string& where) {
-    if (!entry.is_object()) throw Error("{}: expected an object, found {}", where, entry.dump().substr(0, 40));
+/// One number of a material: its unit in files [radians or 1], and the range of check(FurParameters) in that unit.
+struct Field {
+    const char* name;
+    float FurParameters<3>::*value;
+    double unit;
+    const char* range;
+};
+constexpr Field fields[] = {{"eta", &FurParameters<3>::eta, 1, "a value in (1, 10]"},
+                            {"kappa", &FurParameters<3>::kappa, 1, "a value in [0, 1]"},
+                            {"alpha", &FurParameters<3>::alpha, radians, "degrees in [-90, 90]"},
+                            {"beta_m", &FurParameters<3>::beta_m, radians, "degrees in [0.00573, 229.18]"},
+                            {"beta_n", &FurParameters<3>::beta_n, radians, "degrees in [0.00573, 229.18]"},
+                            {"layers", &FurParameters<3>::layers, 1, "a value in [0, 1000]"},
+                            {"sigma_ms", &FurParameters<3>::sigma_ms, 1, "a value in [0, 1e9]"},
+                            {"sigma_ma", &FurParameters<3>::sigma_ma, 1, "a value in [0, 1e9]"},
+                            {"g", &FurParameters<3>::g, 1, "a value in (-1, 1)"}};
+
+/// Whether check() refuses the default fibre with this one field of `fur`.
+bool refused(const FurParameters<3>& fur, const Field& field) {
+    FurParameters<3> alone;
+    alone.*field.value = fur.*field.value;
+    return check(alone) != FurStatus::ok;
+}
+
+/// `pointer`: JSON pointer of the entry in its file, empty where it is the whole.
+Material material_of(const json& entry, const std::string& path, const std::string& pointer) {
+    const std::string inside = path + ": " + pointer;
+    if (!entry.is_object())
+        throw Error("{}: expected an object, found {}", pointer.empty() ? path : inside, quoted(entry));
     Material material;
     if (entry.contains("preset")) {
-        if (!entry["preset"].is_string()) throw Error("{}/preset: expected a name", where);
-        material = preset_material(entry["preset"].get<std::string>(), where + "/preset");
+        const json& preset = entry["preset"];
+        if (!preset.is_string()) throw Error("{}/preset: expected a name, found {}", inside, quoted(preset));
+        material = preset_material(preset.get<std::string>(), inside + "/preset");
     }
     FurParameters<3>& fur = material.fur;
-    const struct {
-        const char* name;
-        float* value;
-        double unit;
-    } fields[] = {{"eta", &fur.eta, 1},
-                  {"kappa", &fur.kappa, 1},
-                  {"alpha", &fur.alpha, radians},
-                  {"beta_m", &fur.beta_m, radians},
-                  {"beta_n", &fur.beta_n, radians},
-                  {"layers", &fur.layers, 1},
-                  {"sigma_ms", &fur.sigma_ms, 1},
-                  {"sigma_ma", &fur.sigma_ma, 1},
-                  {"g", &fur.g, 1}};
     for (const auto& [key, value] : entry.items()) {
-        const std::string field = where + "/" + key;
+        const std::string field = inside + "/" + key;
         if (key == "preset") continue;
         if (key == "name") {
-            if (!value.is_string()) throw Error("{}: expected a name", field);
+            if (!value.is_string()) throw Error("{}: expected a name, found {}", field, quoted(value));
             material.name = value.get<std::string>();
             continue;
         }
         if (key == "fresnel") {
             if (value != "bravais" && value != "exact")
-                throw Error("{}: expected \"bravais\" or \"exact\", found {}", field, value.dump());
+                throw Error("{}: expected \"bravais\" or \"exact\", found {}", field, quoted(value));
             fur.fresnel = value == "exact" ? Fresnel::exact : Fresnel::bravais;
             continue;
         }
@@ -63,20 +81,29 @@ Material material_of(const json& entry, const std::string& where) {
             material.grey = !value.is_array();
             if (value.is_array() && value.size() != 3)
                 throw Error("{}: expected one number or three, found {}", field, value.size());
-            for (std::size_t c = 0; c < 3; ++c)
-                fur.sigma_ca[c] = static_cast<float>(number(value.is_array() ? value[c] : value, field));
+            for (std::size_t c = 0; c < 3; ++c) {
+                const double x = number(value.is_array() ? value[c] : value, field);
+                fur.sigma_ca[c] = static_cast<float>(x);
+                FurParameters<3> alone;
+                alone.sigma_ca[c] = fur.sigma_ca[c];
+                if (check(alone) != FurStatus::ok) throw Error("{}: expected values in [0, 1e9], found {:g}", field, x);
+            }
             continue;
         }
         bool known = false;
-        for (const auto& f : fields)
-            if (key == f.name) *f.value = static_cast<float>(number(value, field) * f.unit), known = true;
+        for (const Field& f : fields) {
+            if (key != f.name) continue;
+            known = true;
+            const double x = number(value, field);
+            fur.*f.value = static_cast<float>(x * f.unit);
+            if (refused(fur, f)) throw Error("{}: expected {}, found {:g}", field, f.range, x);
+        }
         if (!known)
             throw Error(
                 "{}: no such field; expected name, preset, eta, kappa, alpha, beta_m, beta_n, layers, sigma_ca, "
                 "sigma_ms, sigma_ma, g or fresnel",
                 field);
     }
-    if (const FurStatus status = check(fur); status != FurStatus::ok) throw Error("{}: {}", where, describe(status));
     return material;
 }
 
@@ -94,17 +121,18 @@ Material read_material(const std::string& path) { return parse_material(read_tex
 std::vector<Material> read_scene(const std::string& path) { return parse_scene(read_text(path), path); }
 
 Material parse_material(const std::string& text, const std::string& where) {
-    return material_of(parse_json(text.data(), text.data() + text.size(), where), where + ": ");
+    return material_of(parse_json(text.data(), text.data() + text.size(), where), where, "");
 }
 
 std::vector<Material> parse_scene(const std::string& text, const std::string& path) {
     const json scene = parse_json(text.data(), text.data() + text.size(), path);
-    if (!scene.is_object() || !scene.contains("materials") || !scene["materials"].is_array() ||
-        scene["materials"].empty())
-        throw Error("{}: /materials: expected a list of materials", path);
+    const json list = scene.is_object() && scene.contains("materials") ? scene["materials"] : json();
+    if (!list.is_array() || list.empty())
+        throw Error("{}: /materials: expected a list of materials, found {}", path,
+                    list.is_null() ? "none" : quoted(list));
     std::vector<Material> materials;
-    for (std::size_t i = 0; i < scene["materials"].size(); ++i)
-        materials.push_back(material_of(scene["materials"][i], fmt::format("{}: /materials/{}", path, i)));
+    for (std::size_t i = 0; i < list.size(); ++i)
+        materials.push_back(material_of(list[i], path, fmt::format("/materials/{}", i)));
     return materials;
 }
 

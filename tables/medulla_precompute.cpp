@@ -3,10 +3,12 @@
 
 #include <nlohmann/json.hpp>
 
+#include "sim2d/disc_deterministic.hpp"
 #include "tables/forecast.hpp"
 #include "tables/precompute.hpp"
 #include "tables/program.hpp"
 #include "tables/scene.hpp"
+#include "tables/simulate.hpp"
 
 namespace {
 
@@ -22,12 +24,20 @@ struct Words {
     bool json = false, resume = false, dry_run = false;
 };
 
-/// The axis of a range given in words; the default one where there are none.
-Axis axis_of(const std::string& words, const std::string& option, const Axis& standard, double unit = 1) {
-    if (words.empty()) return standard;
-    Range range = parse_range(words, option, standard.size());
-    range.low *= unit, range.high *= unit;
-    return graded_axis(standard.name, range);
+/// The axis `name` of a range given in words, whose numbers are in units of `unit`.
+Axis axis_of(const std::string& words, const std::string& option, const std::string& name, std::size_t default_count,
+             double unit = 1) {
+    Range range = parse_range(words, option, default_count);
+    const AxisRule& rule = axis_rule(name);
+    const double high = name == "sigma" || name == "absorption" ? greatest_radius : rule.high;
+    for (double* end : {&range.low, &range.high}) {
+        const double typed = *end;
+        *end *= unit;
+        if (!(*end >= rule.low && *end <= high))
+            throw Error("{}: expected {} in [{:g}, {:g}], found {:g}", option, unit == 1 ? "values" : "degrees",
+                        rule.low / unit, high / unit, typed);
+    }
+    return graded_axis(name, range);
 }
 
 Request request_of(const Words& words) {
@@ -35,12 +45,14 @@ Request request_of(const Words& words) {
         Request request = default_request();
         request.azimuthal = words.table != "longitudinal";
         request.longitudinal = words.table != "azimuthal";
-        request.sigma = axis_of(words.sigma, "--sigma-range", request.sigma);
-        request.g = axis_of(words.g, "--g-range", request.g);
-        request.h = axis_of(words.h, "--h-range", request.h);
-        request.theta_i = axis_of(words.theta, "--theta-range", request.theta_i, medulla::pi / 180);
-        if (!words.absorption.empty())
-            request.absorption = graded_axis("absorption", parse_range(words.absorption, "--absorption-range", 8));
+        const auto set = [](Axis& axis, const std::string& range, const char* option, double unit = 1) {
+            if (!range.empty()) axis = axis_of(range, option, axis.name, axis.size() > 0 ? axis.size() : 8, unit);
+        };
+        set(request.sigma, words.sigma, "--sigma-range");
+        set(request.g, words.g, "--g-range");
+        set(request.h, words.h, "--h-range");
+        set(request.theta_i, words.theta, "--theta-range", medulla::pi / 180);
+        set(request.absorption, words.absorption, "--absorption-range");  // default: none
         request.bins = words.bins;
         request.paths = words.paths;
         if (words.target_error && *words.target_error == 0)
@@ -115,12 +127,12 @@ void print_forecast(const Job& job, double share, bool as_json) {
                                    {"measured_slices", expected.measured},
                                    {"share_of_whole", share}};
     for (const Table* table : plan.present()) {
-        if (!as_json) fmt::print("{}: {} cells x {} bins\n", table->name, table->cells(), table->bins());
+        if (!as_json) fmt::print("{}: {} x {} bins\n", table->name, counted(table->cells(), "cell"), table->bins());
         for (std::size_t k = 0; k + 1 < table->axes.size(); ++k) {
             const Axis& axis = table->axes[k];
             json["tables"][table->name][axis.name] = axis.values;
             if (!as_json)
-                fmt::print("    {:<10} {:>5} nodes, {:.6g} .. {:.6g} [{}]\n", axis.name, axis.size(),
+                fmt::print("    {:<10} {:>11}, {:.6g} .. {:.6g} [{}]\n", axis.name, counted(axis.size(), "node"),
                            axis.values.front(), axis.values.back(), axis_rule(axis.name).unit);
         }
     }
@@ -129,8 +141,8 @@ void print_forecast(const Job& job, double share, bool as_json) {
         return;
     }
     if (share < 1) fmt::print("{:.2g} % of the cost of all nodes\n", 100 * share);
-    fmt::print("{} slices, {} cells: about {} ({} of one core, as {} of the slices took)\n", expected.slices,
-               expected.cells, duration_text(expected.seconds), duration_text(expected.core_seconds),
+    fmt::print("{}, {}: about {} ({} of one core, as {} of the slices took)\n", counted(expected.slices, "slice"),
+               counted(expected.cells, "cell"), duration_text(expected.seconds), duration_text(expected.core_seconds),
                expected.measured);
 }
 
@@ -143,8 +155,8 @@ void print_share(const Job& job, const JobReport& report, double seconds, bool a
         fmt::print("{}\n", json.dump());
         return;
     }
-    fmt::print("shard {}/{}: {} slices in {} after {}; when every shard is there: furtable merge {} -o {}\n",
-               job.shard->index, job.shard->count, report.slices, report.shards, duration_text(seconds), report.shards,
+    fmt::print("shard {}/{}: {} in {} after {}; when every shard is there: furtable merge {} -o {}\n", job.shard->index,
+               job.shard->count, counted(report.slices, "slice"), report.shards, duration_text(seconds), report.shards,
                job.output);
 }
 
@@ -186,8 +198,8 @@ void run(const Words& words) {
             fmt::print("{}: {} of {} cells did not reach {:g}\n", table->name, above, table->cells(),
                        job.request.target_error);
         if (!words.json)
-            fmt::print("{}: {} cells x {} bins, {}, worst relative standard error of a lobe {:.2e}\n", table->name,
-                       table->cells(), table->bins(), table->method, worst);
+            fmt::print("{}: {} x {} bins, {}, worst relative standard error of a lobe {:.2e}\n", table->name,
+                       counted(table->cells(), "cell"), table->bins(), table->method, worst);
     }
     if (words.json)
         fmt::print("{}\n", json.dump());
@@ -214,16 +226,25 @@ void declare(CLI::App& app, Words& words) {
     app.add_option("--scene", words.scene, "scene file (JSON): only the nodes that its materials can ask for");
     app.add_flag("--dry-run", words.dry_run, "say what would be simulated and how long it will take; write nothing");
     app.add_option("--bins", words.bins, "exit directions over the full circle, even")->capture_default_str();
-    app.add_option("--method", words.method, "how each cell is solved")
+    app.add_option(
+           "--method", words.method,
+           fmt::format("how each cell is solved. deterministic: without noise, on grids for a relative L2 error "
+                       "of {0:g} of each lobe (or of --target-error). auto: the same, and by walks (mc) in discs "
+                       "of sigma above {1:g} and where a cell's own estimate of its error is above what --paths "
+                       "counted paths would leave. analog, mc: random",
+                       medulla::sim2d::DiscOptions{}.target_error, greatest_grid_sigma))
         ->check(CLI::IsMember({"auto", "analog", "mc", "deterministic"}))
         ->capture_default_str();
     // Each excludes the others. (An option group would do it too, but CLI11 2.1 does not end on stray words beside
     // one.)
     CLI::Option* paths =
-        app.add_option("--paths", words.paths, "paths per cell of the random methods")->capture_default_str();
+        app.add_option("--paths", words.paths,
+                       "paths per cell of the random methods; without another stopping rule, auto's measure of a grid")
+            ->capture_default_str();
     CLI::Option* target =
         app.add_option("--target-error", words.target_error,
-                       "instead: relative L2 standard error below which each cell is solved, 1e-5 to 0.1")
+                       fmt::format("instead: relative L2 standard error below which each cell is solved, {:g} to {:g}",
+                                   least_target, greatest_target))
             ->excludes(paths);
     app.add_option(
            "--time-budget", words.time_budget,

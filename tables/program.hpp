@@ -14,6 +14,9 @@ class UsageError : public Error {
     using Error::Error;
 };
 
+/// It could not be done, and why stands on standard error already: exit status 1 without a further line.
+class Reported {};
+
 /// Ended by a signal: exit status 128 + its number.
 class Interrupted : public Error {
   public:
@@ -22,6 +25,12 @@ class Interrupted : public Error {
         : Error(format, std::forward<Args>(args)...), signal(number) {}
     const int signal;
 };
+
+/// One line on standard error, whatever stood in a file or a word that `text` quotes.
+void say(const std::string& program, std::string text);
+
+/// "1 node", "2 nodes"
+std::string counted(std::size_t count, const std::string& thing);
 
 /// Parses, runs and turns every error into one line on standard error. 0 done, 1 could not be done, 2 wrong words,
 /// 128 + number of a signal.

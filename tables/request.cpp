@@ -42,11 +42,12 @@ void check_request(const Request& request) {
     if (request.absorption.size() > 0) {
         check_axis(request.absorption, "--absorption-range");
         if (!request.azimuthal) throw Error("--absorption-range: expected the azimuthal table, which has that axis");
-        if (request.absorption.values.back() > 1000)
-            throw Error("--absorption-range: expected at most 1000, found {:g}", request.absorption.values.back());
+        if (request.absorption.values.back() > greatest_radius)
+            throw Error("--absorption-range: expected at most {:g}, found {:g}", greatest_radius,
+                        request.absorption.values.back());
     }
-    if (request.sigma.values.back() > 1000)
-        throw Error("--sigma-range: expected at most 1000, found {:g}", request.sigma.values.back());
+    if (request.sigma.values.back() > greatest_radius)
+        throw Error("--sigma-range: expected at most {:g}, found {:g}", greatest_radius, request.sigma.values.back());
     if (request.bins < 8 || request.bins > 4096 || request.bins % 2 != 0)
         throw Error("--bins: expected an even number from 8 to 4096, found {}", request.bins);
     const int most_bits = request.method == Method::analog ? 40 : 35;  // what the tracers have random numbers for

@@ -30,6 +30,9 @@ struct Request {
 /// Nodes and ranges of the default tables: sigma 0:16:24, g 0:0.95:16, h 0:1:16, theta 0:90:16 degrees, 720 bins.
 Request default_request();
 
+/// Greatest optical radius, of scattering and of absorption.
+inline constexpr double greatest_radius = 1000;
+
 /// Least and greatest target_error.
 inline constexpr double least_target = 1e-5, greatest_target = 0.1;
 

@@ -98,10 +98,6 @@ double error_of_paths(const std::vector<sim2d::Profile>& cells, const Goal& goal
     return e;
 }
 
-/// In denser discs than this `auto` walks from the start. Seconds to 1e-2 by walks and by grids: at sigma 30, g 0.9
-/// 0.25 and 0.07, at sigma 100 0.4 and 3, at sigma 100, g 0.99 5 and 140 (docs/accuracy.md).
-constexpr double greatest_grid_sigma = 50;
-
 /// A slice's solvers: `exact(aim)` gives all cells without noise, `walk(i, goal)` one cell by the fast random solver,
 /// `count(i, paths)` one by the analog tracer.
 template <class Exact, class Walk, class Count>

@@ -305,13 +305,22 @@ void Source::check(TableKind kind, const Parameters& at, const std::string& path
     if (!has(kind)) throw Error("{}: expected a table of {} lobes, found none", path, name_of(kind));
     if (kind == TableKind::azimuthal && at.absorption != 0 && !absorbs())
         throw Error("{}: expected absorption 0, since there is no such axis, found {:g}", path, at.absorption);
+    if (const std::string text = beyond(kind, at); !text.empty()) throw Error("{}: {}", path, text);
+}
+
+std::string Source::beyond(TableKind kind, const Parameters& at) const {
+    if (!has(kind)) return "";
     for (const Axis& axis : parameter_axes(kind)) {
         const double x = at[axis.name], low = axis.values.front(), high = axis.values.back();
         // Packs keep their axes in float: half a unit in its last place is no reason to refuse an end.
         const double slack = 1e-6 * std::max(std::abs(low), std::abs(high));
+        // As they are typed: angles in degrees.
+        const double unit = axis.name == "theta_i" ? pi / 180 : 1;
         if (!(x >= low - slack && x <= high + slack))
-            throw Error("{}: {} expected in [{:g}, {:g}], found {:g}", path, axis.name, low, high, x);
+            return fmt::format("{} expected in [{:g}, {:g}]{}, found {:g}", axis.name, low / unit, high / unit,
+                               unit == 1 ? "" : " degrees", x / unit);
     }
+    return "";
 }
 
 bool Source::absorbs() const {
@@ -334,10 +343,10 @@ std::unique_ptr<Source> pack_source(std::vector<unsigned char> bytes, const std:
 
 std::unique_ptr<Source> open_source(const std::string& path) {
     if (path != "default" && is_hdf5(path)) return table_source(read_tables(path));
-    return pack_source(read_pack(path), path);
+    return pack_source(read_pack(path, true), path);
 }
 
-std::vector<unsigned char> read_pack(const std::string& path) {
+std::vector<unsigned char> read_pack(const std::string& path, bool or_tables) {
     if (path == "default") {
         const auto* bytes = reinterpret_cast<const unsigned char*>(default_pack_words);
         return {bytes, bytes + default_pack_size};
@@ -345,8 +354,8 @@ std::vector<unsigned char> read_pack(const std::string& path) {
     std::vector<unsigned char> bytes = read_file(path);
     const OpenResult opened = open_pack(bytes.data(), bytes.size());
     if (opened.status != PackStatus::ok)
-        throw Error("{}: expected a tables file (HDF5) or a pack of version {}: {}", path, pack_version,
-                    describe(opened.status));
+        throw Error("{}: expected a {}pack of version {}: {}", path, or_tables ? "tables file (HDF5) or a " : "",
+                    pack_version, !or_tables && is_hdf5(path) ? "found a tables file (HDF5)" : describe(opened.status));
     return bytes;
 }
 

@@ -49,7 +49,10 @@ class Source {
     virtual double survival(const Parameters& at) const = 0;
     bool absorbs() const;  ///< whether azimuthal lobes have an axis of absorption
 
-    /// Throws Error that names the axis, its range and the value if `at` lies outside; checks presence first.
+    /// The first axis beyond whose ends `at` lies, its range and the value, as text; empty if it lies within, or there
+    /// is no such table.
+    std::string beyond(TableKind kind, const Parameters& at) const;
+    /// Throws Error that says beyond(..); checks presence first.
     void check(TableKind kind, const Parameters& at, const std::string& path) const;
 };
 
@@ -62,8 +65,9 @@ std::unique_ptr<Source> open_source(const std::string& path);
 std::unique_ptr<Source> table_source(Tables tables);
 std::unique_ptr<Source> pack_source(std::vector<unsigned char> bytes, const std::string& path);
 
-/// Reads and validates a pack's bytes (`default`: the one built in). Throws Error that names the path.
-std::vector<unsigned char> read_pack(const std::string& path);
+/// Reads and validates a pack's bytes (`default`: the one built in). Throws Error that names the path; `or_tables`:
+/// that a tables file would do as well.
+std::vector<unsigned char> read_pack(const std::string& path, bool or_tables = false);
 
 /// Error of one source against another, over every node of the reference.
 struct LobeError {

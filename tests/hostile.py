@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Files that lie on purpose, their checksums mended: each is refused in one line, before memory is taken for it.
 
-hostile.py BIN. Where tests/mutate.cpp damages at random, this states each lie: sizes, shapes, order of axes, versions,
+hostile.py BIN. Prints how many. Where tests/mutate.cpp damages at random, this states each lie: sizes, shapes, order of axes, versions,
 numbers that are no energies, compressions that expand without end, JSON that nests beyond the stack.
 """
 import hashlib
@@ -20,6 +20,10 @@ import numpy
 BIN = os.path.abspath(sys.argv.pop(1))
 AXES = ["--sigma-range", "0:4:3", "--g-range", "0:0.6:3", "--h-range", "0:1:3", "--theta-range", "0:80:3", "--bins", "36"]
 MEMORY = 3 << 30  # address space: what the programs and their libraries map, and room for what these files may ask
+with open(os.path.join(BIN, "furtable"), "rb") as f:
+    program = f.read()
+if b"__asan_init" in program or b"__tsan_init" in program:
+    MEMORY = None  # a sanitizer maps terabytes
 
 
 def run(program, *words, memory=None):
@@ -72,11 +76,15 @@ class Hostile(unittest.TestCase):
         with open(cls.path("good.furpack"), "rb") as f:
             cls.pack = f.read()
 
+    lies = 0
+
     @classmethod
     def tearDownClass(cls):
+        print(f"{Hostile.lies} lies, each refused")
         cls.folder.cleanup()
 
     def refused(self, file, *parts, commands=("info", "verify")):
+        Hostile.lies += 1
         for command in commands:
             code, out, err = run("furtable", command, file, memory=MEMORY)
             self.assertEqual((code, out), (1, ""), (command, parts, err))
@@ -234,6 +242,7 @@ class Hostile(unittest.TestCase):
                 f.write(text)
             code, out, err = run("furtable", "bcsdf", "--material", file, "--theta-i", 10, "--theta-r", 10, "--phi", 0, "--far",
                                  memory=MEMORY)
+            Hostile.lies += 1
             self.assertEqual((code, out), (1, ""), (text[:30], err))
             self.assertEqual(len(err.strip().splitlines()), 1, err)
             self.assertLess(len(err), 400)
@@ -247,6 +256,7 @@ class Hostile(unittest.TestCase):
             with open(os.path.join(folder, "configuration.json"), "w") as f:
                 f.write(text)
             code, out, err = run("furtable", "merge", folder, "-o", self.path("merged.h5"), memory=MEMORY)
+            Hostile.lies += 1
             self.assertEqual((code, out), (1, ""), (text[:30], err))
             self.assertEqual(len(err.strip().splitlines()), 1, err)
             self.assertIn("configuration.json", err)

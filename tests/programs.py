@@ -3,6 +3,9 @@
 import json
 import math
 import os
+import re
+import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -57,6 +60,95 @@ class Programs(unittest.TestCase):
         self.fails(2, "furtable", "query", "t.h5", "--table", "azimuthal", "--sigma", 1, "--g", 0.3)
         self.fails(2, "furtable", "query", "t.h5", "--table", "longitudinal", "--sigma", 1, "--g", 0.3, "--h", 0.1)
         self.fails(2, "furtable", "plot", "t.h5", "-o", "x.jpg")
+
+    def test_empty_words(self):
+        """CLI11 2.1 hangs on some of them (a find of fuzz/words.cpp)."""
+        for words in ([""], ["bcsdf", "", "-ai-th"], ["info", "t.h5", ""]):
+            self.fails(2, "furtable", *words, names=["empty word", f"number {words.index('') + 1}"])
+        self.fails(2, "medulla-precompute", "-o", "", names=["empty word", "number 2"])
+
+    def test_messages_speak_as_the_user_did(self):
+        """Ranges and degrees as they were typed; what there is in place of what there is not."""
+        for words, names in ((["--theta-range", "0:91"], ["degrees in [0, 90]", "found 91"]),
+                             (["--h-range", "0:2"], ["[0, 1]", "found 2"]),
+                             (["--g-range", "-1:0.5"], ["[-0.999, 0.999]", "found -1"]),
+                             (["--sigma-range", "0:2000"], ["[0, 1000]", "found 2000"]),
+                             (["--absorption-range", "0:1001"], ["[0, 1000]", "found 1001"])):
+            self.fails(2, "medulla-precompute", *words, names=[words[0], *names])
+        self.fails(1, "furtable", "query", "t.h5", "--table", "longitudinal", "--sigma", 1, "--g", 0.3, "--theta", 75,
+                   names=["theta_i", "[0, 60] degrees", "found 75"])
+        for words in (["foo"], ["foo", "t.h5"]):
+            self.fails(2, "furtable", *words, names=["command", "info, compress", "presets", "found 'foo'"])
+        self.fails(2, "furtable", names=["info, compress", "found none"])
+        for words in (["export", "t.h5", "--format", "cpp", "-o", "x"],
+                      ["bcsdf", "--preset", "cat", "--theta-i", 1, "--theta-r", 1, "--phi", 1, "--far", "--pack", "t.h5"]):
+            self.fails(1, "furtable", *words, names=["t.h5: expected a pack", "found a tables file"])
+        one = ["--sigma-range", "2:2", "--g-range", "0:0", "--h-range", "0:0", "--table", "azimuthal", "--bins", "36"]
+        self.assertRegex(run("medulla-precompute", *one, "--dry-run")[1], r"1 cell x(.|\n)* 1 node,(.|\n)*1 slice, 1 cell:")
+
+    def test_help_says_when_a_cell_is_done_and_what_verify_accepts(self):
+        text = " ".join(run("medulla-precompute", "--help")[1].split())
+        self.assertIn("relative L2 error of 0.001", text)
+        self.assertIn("padded with zeros to a multiple of 8", run("furtable", "compress", "--help")[1])
+        self.assertRegex(run("furtable", "verify", "--help")[1], r"--max-integral-error FLOAT.*=0\.5")
+        info = run("furtable", "info", self.path("t.h5"))[1]
+        self.assertIn("method auto: without paths, or with 2000", info)
+        file = self.path("exact.h5")
+        self.assertEqual(run("medulla-precompute", "-o", file, *SMALL, "--method", "deterministic")[0], 0)
+        self.assertNotIn("paths", run("furtable", "info", file)[1])
+
+    def test_a_target_that_cannot_be_met_is_said(self):
+        """The slab's noise-free solver has no finer grids to go to."""
+        words = ["--sigma-range", "4:4", "--g-range", "0.99:0.99", "--theta-range", "0:80:3", "--bins", "72", "--table",
+                 "longitudinal", "--method", "deterministic", "--target-error", "1e-5", "--progress", "none"]
+        status, out, err = run("medulla-precompute", "-o", self.path("target.h5"), *words, "--json")
+        self.assertEqual((status, err), (0, ""))
+        table = json.loads(out)["tables"]["longitudinal"]
+        self.assertEqual(table["cells"], 6)
+        self.assertGreater(table["cells_above_target"], 0)
+        self.assertGreater(table["worst_standard_error"], 1e-5)
+        status, out, err = run("medulla-precompute", "-o", self.path("target.h5"), *words)
+        self.assertIn(f"longitudinal: {table['cells_above_target']} of 6 cells did not reach 1e-05", out)
+
+    def test_bounds_of_compress(self):
+        """--max-bytes names the least size there is; non-negative packs keep --max-error themselves."""
+        code, out, err = run("furtable", "compress", self.path("t.h5"), "--max-bytes", 1000, "-o", self.path("b.furpack"))
+        self.assertEqual((code, out), (1, ""))
+        least = int(re.search(r"expected at least (\d+) .*found 1000", err).group(1))
+        words = ["compress", self.path("t.h5"), "-o", self.path("b.furpack"), "--max-bytes"]
+        self.assertEqual(run("furtable", *words, least)[0], 0)
+        self.assertEqual(os.path.getsize(self.path("b.furpack")), least)
+        self.fails(1, "furtable", *words, least - 1, names=[str(least), str(least - 1)])
+        for bound in (0.2, 0.06):
+            code, out, err = run("furtable", "compress", self.path("t.h5"), "--nonnegative", "--max-error", bound, "-o",
+                                 self.path("b.furpack"), "--json")
+            self.assertEqual(code, 0, err)
+            report = json.loads(out)
+            for kind, error in report["errors"].items():
+                self.assertLessEqual(error["relative_l2"], bound)
+                self.assertAlmostEqual(report["factors"][kind]["relative_l2_in_pack"] / error["relative_l2"], 1, delta=0.01)
+
+    def test_verify_checks_every_file(self):
+        with open(self.path("bad.furpack"), "wb") as f:
+            f.write(b"no pack")
+        files = [self.path(name) for name in ("bad.furpack", "t.h5", "none", "t.furpack")]
+        code, out, err = run("furtable", "verify", *files)
+        self.assertEqual(code, 1)
+        self.assertEqual([line.split(": ")[1] for line in err.splitlines()], [files[0], files[2]])
+        self.assertEqual([line.split(": ok:")[0] for line in out.splitlines() if ": ok:" in line], [files[1], files[3]])
+        code, out, err = run("furtable", "verify", *files, "--json")
+        self.assertEqual((code, len(err.splitlines())), (1, 2))
+        entries = json.loads(out)
+        self.assertEqual(list(entries), files)
+        self.assertEqual([entry["ok"] for entry in entries.values()], [False, True, False, True])
+        for file, entry in entries.items():
+            self.assertEqual(list(entry), ["ok", "error", "cells", "energy_error", "degeneracy"])
+            self.assertEqual(entry["error"] is None, entry["ok"])
+            if not entry["ok"]:
+                self.assertIn(file, entry["error"])
+        found = entries[files[3]]["energy_error"]
+        self.assertEqual(run("furtable", "verify", files[3], "--max-integral-error", 1.01 * found)[0], 0)
+        self.fails(1, "furtable", "verify", files[3], "--max-integral-error", 0.99 * found, names=["integral 1"])
 
     def test_target_error(self):
         coarse = SMALL[:-4] + ["--progress", "none", "--json", "--target-error", "0.05"]
@@ -258,6 +350,39 @@ class Programs(unittest.TestCase):
         self.assertEqual(numpy.load(self.path("a.npy")).shape, (5, 3, 4, 72))
         self.assertEqual(run("furtable", "export", self.path("t.furpack"), "--format", "cpp", "-o", self.path("p.hpp"))[0], 0)
 
+    def test_glsl(self):
+        """Its words are the pack's, and GLSL's own compiler takes it; tests/glsl_values.cpp compares its numbers."""
+        file = self.path("fur.glsl")
+        self.assertEqual(run("furtable", "export", self.path("t.furpack"), "--format", "glsl", "--name", "fox", "-o", file)[0], 0)
+        with open(file) as f:
+            text = f.read()
+        count, words = re.search(r"const uint fox_words\[(\d+)\] = uint\[\d+\]\(([^)]*)\);", text).groups()
+        words = [int(word.rstrip("u"), 16) for word in words.replace("\n", "").split(",")]
+        with open(self.path("t.furpack"), "rb") as f:
+            pack = f.read()
+        self.assertEqual(int(count), len(words))
+        self.assertEqual(struct.pack(f"<{len(words)}I", *words), pack.ljust(4 * len(words), b"\0"))
+        for name in ("gl_fur", "a__b", "fur_"):
+            self.fails(2, "furtable", "export", "t.furpack", "--format", "glsl", "--name", name, "-o", "no.glsl", names=[name])
+        self.fails(1, "furtable", "export", "t.h5", "--format", "glsl", "-o", "no.glsl", names=["t.h5: expected a pack"])
+        if not shutil.which("glslangValidator"):
+            self.skipTest("no glslangValidator (package glslang-tools)")
+        asked = ("fox_azimuthal(1.0, 0.5, 0.3, 1.0) + fox_longitudinal(true, 1.0, 0.4, 0.1, 0.2) + "
+                 "fox_back_fraction(1.0, 0.2, 0.3)")
+        buffer = "layout(std430, binding = 1) readonly buffer Pack { uint pack[]; };\n#define FOX_WORD(i) pack[i]\n"
+        compute = "layout(local_size_x = 64) in;\nlayout(std430, binding = 0) buffer Out { float result[]; };\n"
+        for stage, before, after in (
+                ("comp", "#version 430\n" + compute, f"void main() {{ result[0] = {asked}; }}"),
+                ("comp", "#version 310 es\nprecision highp float;\n" + compute + buffer, f"void main() {{ result[0] = {asked}; }}"),
+                ("frag", "#version 330\nout vec4 colour;\n", f"void main() {{ colour = vec4({asked}); }}"),
+                ("frag", "#version 300 es\nprecision highp float;\nout vec4 colour;\n", f"void main() {{ colour = vec4({asked}); }}")):
+            shader = self.path("shader." + stage)
+            with open(shader, "w") as f:
+                f.write(before + text + after)
+            done = subprocess.run(["glslangValidator", shader], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, (before, done.stdout[-2000:]))
+            self.assertNotIn("WARNING", done.stdout)
+
     def test_axis_of_absorption(self):
         words = ["--table", "azimuthal", "--absorption-range", "0:2:4", *SMALL]
         file, pack = self.path("absorb.h5"), self.path("absorb.furpack")
@@ -352,12 +477,36 @@ class Programs(unittest.TestCase):
         self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, "--h", 2, names=["--h", "[-1, 1]", "2"])
         self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, "--h-range", "1:0", names=["--h-range", "1:0"])
         self.fails(2, "furtable", "bcsdf", "--preset", "cat", "--theta-i", 91, *where[2:], "--far", names=["--theta-i"])
+        for grazing in (90, -90, 89.9999999):
+            self.fails(2, "furtable", "bcsdf", "--preset", "cat", "--theta-i", grazing, *where[2:], "--far",
+                       names=["--theta-i", "(-90, 90)", f"{grazing:g}"])
+        # Whole turns count for nothing, however many.
+        turned = ["--theta-i", 20, "--theta-r", -15, "--phi", 170 + 360 * 10 ** 9]
+        self.assertEqual(lobes("--preset", "cat", *turned, "--far"), lobes("--preset", "cat", *where, "--far"))
         self.fails(1, "furtable", "bcsdf", "--material", "none.json", *where, "--far", names=["none.json"])
         self.fails(1, "furtable", "bcsdf", "--preset", "cat", *where, "--far", "--pack", "none", names=["none"])
         for field, value in (("eta", 0.5), ("fresnel", "none"), ("sigma_ca", [1, 2]), ("colour", 1), ("kappa", "big")):
             with open(material, "w") as f:
                 json.dump({"preset": "cat", field: value}, f)
-            self.fails(1, "furtable", "bcsdf", "--material", material, *where, "--far", names=["m.json", field])
+            self.fails(1, "furtable", "bcsdf", "--material", material, *where, "--far", names=["m.json: /" + field])
+        for field, value, names in (("eta", 0.5, ["(1, 10]", "found 0.5"]), ("alpha", 91, ["degrees in [-90, 90]", "91"]),
+                                    ("beta_m", 0.005, ["degrees", "found 0.005"]), ("g", 1, ["(-1, 1)", "found 1"]),
+                                    ("sigma_ca", [1, -2, 3], ["[0, 1e9]", "found -2"]), ("preset", 3, ["found 3"])):
+            with open(material, "w") as f:
+                json.dump({field: value}, f)
+            self.fails(1, "furtable", "bcsdf", "--material", material, *where, "--far", names=[f"/{field}: expected", *names])
+        # Beyond the pack's axes their ends hold, which is said.
+        ranges = {"sigma": "[0, 4]", "g": "[0, 0.6]"}
+        for field, value, axis in (("sigma_ms", 9, "sigma"), ("g", 0.7, "g")):
+            with open(material, "w") as f:
+                json.dump({"preset": "cat", field: value}, f)
+            words = ["bcsdf", "--material", material, *where, "--far", "--json"]
+            code, out, err = run("furtable", *words, "--pack", self.path("t.furpack"))
+            self.assertEqual((code, len(err.splitlines())), (0, 1), err)
+            for part in ("warning", "t.furpack", f"{axis} expected in {ranges[axis]}, found "):
+                self.assertIn(part, err)
+            self.assertGreater(json.loads(out)["lobes"]["TTs"]["value"], 0)
+            self.assertEqual(run("furtable", *words)[2], "")  # the default pack's axes are longer
 
     def test_no_temporary_file_is_left(self):
         self.assertEqual([name for name in os.listdir(self.folder.name) if ".tmp" in name], [])

@@ -1,0 +1,112 @@
+// What `furtable export --format glsl` writes, compiled as C++ with a small vec4 and held against the runtime: the same
+// sums in the same order give the same bits; only 1 - exp(-x) is another formula. glsl_values ABSORBING.furpack
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <vector>
+
+#include "medulla/medulla.hpp"
+
+namespace {
+
+std::vector<unsigned char> absorbing;
+
+std::uint32_t word_of(const void* pack, int i) {
+    std::uint32_t word;
+    std::memcpy(&word, static_cast<const unsigned char*>(pack) + 4 * i, sizeof word);
+    return word;
+}
+
+}  // namespace
+
+namespace glsl {
+
+using uint = std::uint32_t;
+using std::exp, std::floor, std::sqrt;
+
+struct vec4 {
+    float x, y, z, w;
+};
+vec4 operator+(vec4 a, vec4 b) { return {a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w}; }
+vec4 operator*(vec4 a, vec4 b) { return {a.x * b.x, a.y * b.y, a.z * b.z, a.w * b.w}; }
+vec4 operator*(float s, vec4 a) { return {s * a.x, s * a.y, s * a.z, s * a.w}; }
+float uintBitsToFloat(uint bits) {
+    float x;
+    std::memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+// Instead of the embedded arrays, whose words tests/programs.py compares with the pack's.
+#define BUILT_IN_WORD(i) word_of(medulla::default_pack_words, i)
+#define ABSORBING_WORD(i) word_of(absorbing.data(), i)
+#include "absorbing.glsl"
+#include "built_in.glsl"
+
+}  // namespace glsl
+
+namespace {
+
+using namespace medulla;
+
+int failures = 0;
+double worst = 0;  // relative difference where another formula stands
+
+void same(const char* what, float expected, float found) {
+    if (std::memcmp(&expected, &found, sizeof found) == 0 || (expected == 0 && found == 0)) return;
+    if (failures++ < 10) std::printf("%s: expected %.9g, found %.9g\n", what, double(expected), double(found));
+}
+
+/// 4e-7: rounding of exp(-x) where 1 - exp(-x) is 0.22, and of the five products around it.
+void near(const char* what, float expected, float found) {
+    const double off = std::abs(double(found) / double(expected) - 1);
+    if (expected == found) return;
+    worst = std::fmax(worst, off);
+    if (off > 4e-7) same(what, expected, found);
+}
+
+}  // namespace
+
+int main(int, char** argv) {
+    std::ifstream file(argv[1], std::ios::binary);
+    absorbing.assign(std::istreambuf_iterator<char>(file), {});
+    const OpenResult plain = open_pack(default_pack_words, default_pack_size);
+    const OpenResult opened = open_pack(absorbing.data(), absorbing.size());
+    if (plain.status != PackStatus::ok || opened.status != PackStatus::ok || !absorbs(opened.pack)) {
+        std::printf("no packs\n");
+        return 1;
+    }
+    std::mt19937 random(1);
+    const auto uniform = [&](float low, float high) {
+        return low + (high - low) * float(random() >> 8) / float(1 << 24);
+    };
+    const int count = 20000;
+    for (int i = 0; i < count; ++i) {
+        // Also beyond the axes, at their ends, and more than a turn around; every few on a node.
+        const float sigma = i % 7 == 0 ? 0.0f : uniform(0, 20) * uniform(0, 1),
+                    g = i % 11 == 0 ? 0.95f : uniform(-0.1f, 0.97f);
+        const float h = i % 13 == 0 ? 1.0f : uniform(-1, 1), phi = uniform(-20, 20), absorption = uniform(0, 3);
+        const float theta_i = i % 17 == 0 ? float(pi / 2) : uniform(-1.57f, 1.57f), theta_r = uniform(-1.57f, 1.57f);
+        LobeQuery query;
+        query.sigma = sigma, query.g = g, query.h = std::abs(h);
+        const TableView& table = plain.pack[TableKind::azimuthal];
+        same("lobe", lobe(table, contract(table, query), phi),
+             glsl::built_in_lobe(glsl::built_in_AZIMUTHAL,
+                                 glsl::built_in_contract(glsl::built_in_AZIMUTHAL, {sigma, g, 0, std::abs(h)}), phi));
+        near("azimuthal", azimuthal(plain.pack, sigma, g, h, phi), glsl::built_in_azimuthal(sigma, g, h, phi));
+        for (const Side side : {Side::back, Side::forward})
+            same("longitudinal", longitudinal(plain.pack, side, sigma, g, theta_i, theta_r),
+                 glsl::built_in_longitudinal(side == Side::forward, sigma, g, theta_i, theta_r));
+        query.theta_i = std::abs(theta_i);
+        const TableView& shares = plain.pack[TableKind::back_fraction];
+        same("back_fraction", scalar(shares, contract(shares, query)), glsl::built_in_back_fraction(sigma, g, theta_i));
+        same("survival", survival(opened.pack, sigma, g, h, absorption),
+             glsl::absorbing_survival(sigma, g, h, absorption));
+        near("azimuthal, absorbing", azimuthal(opened.pack, sigma, g, h, phi, absorption),
+             glsl::absorbing_azimuthal(sigma, g, h, phi, absorption));
+    }
+    std::printf("%d queries, %d unlike the runtime; 1 - exp(-x) makes at most %.1e\n", count, failures, worst);
+    return failures == 0 ? 0 : 1;
+}

@@ -212,6 +212,27 @@ double kind_error(const Solves& solves, std::size_t first, std::size_t last) {
     return std::sqrt(sum);
 }
 
+/// Shares out again with what the solves at these ranks say in the pilots' place, as long as that lowers the errors.
+/// Solves of great ranks take seconds, and steps of the format matter less there: those only where more sweeps are
+/// asked.
+void share_again(Solves& solves, std::size_t bytes, const CompressOptions& options, const Source* tables) {
+    const auto total = [](const Solves& all) {
+        double sum = 0;
+        for (const auto& [first, last] : kinds_of(all))
+            if (all[first].part->lobes()) sum += std::pow(kind_error(all, first, last), 2);
+        return sum;
+    };
+    for (int tries = 0; tries < 4; ++tries) {
+        for (const Solve& solve : solves)
+            if (solve.rank > 96 && !options.max_sweeps) return;
+        Solves next = solves;
+        share_bytes(next, bytes);
+        run(next, options, false, tables);
+        if (!(total(next) < total(solves))) return;
+        solves = std::move(next);
+    }
+}
+
 /// Least ranks on the steps of the format that keep `error`: predicted from the last solve, solved, and predicted again
 /// until the prediction stands.
 void solve_to(Solves& solves, double error, const CompressOptions& options, const Source* tables) {
@@ -353,6 +374,7 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
         }
     }
     run(solves, options, false, source.get());
+    if (options.max_bytes) share_again(solves, *options.max_bytes, options, source.get());
     CompressResult result;
     std::vector<PackedTable> packed;
     for (const auto& [first, last] : kinds_of(solves)) {

@@ -67,8 +67,7 @@ struct FarField {
     detail::Cuts cuts[3];                 ///< of R, TT, TRT
     int nodes = 0;                        ///< scattering nodes
     ScatteringNode<Channels> node[most_scattering_nodes];
-    Four sigma_point;              ///< where sigma lies in unfolded tables, if the fibre has them
-    float sigma_weight[max_rank];  ///< else the azimuthal table contracted to it and to the absorption
+    float sigma_weight[max_rank];  ///< without unfolded tables: the azimuthal one contracted to sigma and absorption
 
     MEDULLA_FN const FurFibre<Channels>& fibre() const noexcept { return *near.fibre; }
     MEDULLA_FN LobeValues<Channels> lobes(float theta_r, float phi) const noexcept;
@@ -349,12 +348,10 @@ MEDULLA_FN void far_field(const FurFibre<Channels>& fibre, float theta_i, Offset
     far.gamma_rim = angle(far.rim);
     detail::place_cuts(far);
     if (!fibre.scattered) return;
-    const float sigma = far.near.longitudinal.sigma;
-    if (fibre.tables != nullptr) {
-        far.sigma_point = fibre.tables->sigma_at(sigma);
-    } else {
-        const float* weight = weights_at(fibre.azimuthal, far.near.longitudinal.absorbed, far.sigma_weight);
-        contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, sigma, weight, far.sigma_weight);
+    if (fibre.tables == nullptr) {
+        const Longitudinal<Channels>& m = far.near.longitudinal;
+        const float* weight = weights_at(fibre.azimuthal, m.absorbed, far.sigma_weight);
+        contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, m.sigma, weight, far.sigma_weight);
     }
     detail::place_scattering_nodes(far);
 }
@@ -392,11 +389,11 @@ MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, floa
     for (int i = 0; i < far.nodes; ++i) {
         const ScatteringNode<Channels>& n = far.node[i];
         if (unfolded != nullptr) {
-            const AzimuthalPoint at = unfolded->azimuthal_at(far.sigma_point, n.offset);
-            for (int p = 0; p < 2; ++p) {
-                const float D = unfolded->azimuthal_density(at, n.side * (phi - n.centre[p]));
-                for (int c = 0; c < Channels; ++c) N[p][c] += n.A[p][c] * D;
-            }
+            const AzimuthalPoint at = unfolded->azimuthal_at(far.near.longitudinal.sigma_point, n.offset);
+            float D[2];
+            unfolded->azimuthal_densities(at, n.side * (phi - n.centre[0]), n.side * (phi - n.centre[1]), D);
+            for (int p = 0; p < 2; ++p)
+                for (int c = 0; c < Channels; ++c) N[p][c] += n.A[p][c] * D[p];
             continue;
         }
         contract_axis(table.view, table.last_axis, last_point(table, n.offset), far.sigma_weight, contraction.weight);

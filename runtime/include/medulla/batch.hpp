@@ -9,6 +9,8 @@ namespace medulla {
 
 namespace detail {
 
+inline constexpr int batch_block = 16;
+
 /// C^N and C^M of one near field as splines over the exit alone: a lookup is then four products. Rows of y >= 0, then
 /// those of y < 0; some beyond the last are read and not used.
 struct ExitRows {
@@ -44,21 +46,19 @@ struct ExitRows {
                        longitudinal + k);
         }
     }
-    /// Densities at four exits of TTs or TRTs, >= 0.
-    MEDULLA_HOT Four azimuthal_densities(const UnfoldedTables& tables, Four y) const noexcept {
-        const ExitPlaces places = exit_places(turns_of(y), Four(tables.azimuth_scale()));
+    /// Densities of TTs or TRTs at four places, >= 0.
+    MEDULLA_HOT Four azimuthal_densities(const UnfoldedTables& tables, const ExitPlaces& places) const noexcept {
         Four at[4];
         for (int i = 0; i < 4; ++i) {
             const RowPoint exit = tables.azimuth.at(places.stretch[i], places.place[i]);
             at[i] = exit.weight * four_at(azimuthal + exit.first + tables.azimuth_rows() * (places.below >> i & 1u));
         }
         transpose(at[0], at[1], at[2], at[3]);
-        const Four sum = (at[0] + at[1]) + (at[2] + at[3]);
-        return greater(sum, Four(0.0f));
+        return greater((at[0] + at[1]) + (at[2] + at[3]), Four(0.0f));
     }
-    /// M^s of Eq. 19 at four exits. @param forwardness |phi| / pi
-    MEDULLA_HOT Four longitudinal_densities(const UnfoldedTables& tables, Four y, Four forwardness) const noexcept {
-        const ExitPlaces places = exit_places(turns_of(y), Four(tables.longitude_scale()));
+    /// M^s of Eq. 19 at four places. @param forwardness |phi| / pi
+    MEDULLA_HOT Four longitudinal_densities(const UnfoldedTables& tables, const ExitPlaces& places,
+                                            Four forwardness) const noexcept {
         Four at[4];
         for (int i = 0; i < 4; ++i) {
             const RowPoint exit = tables.longitude_exit(places, i);
@@ -66,8 +66,8 @@ struct ExitRows {
                     upper_twice(exit.weight) * four_at(longitudinal + exit.first + 4);
         }
         transpose(at[0], at[1], at[2], at[3]);
-        const Four zero(0.0f), back = at[0] + at[2], forward = at[1] + at[3];
-        return (Four(1.0f) - forwardness) * greater(back, zero) + forwardness * greater(forward, zero);
+        const Four zero(0.0f);
+        return (Four(1.0f) - forwardness) * greater(at[0] + at[2], zero) + forwardness * greater(at[1] + at[3], zero);
     }
 };
 
@@ -82,33 +82,70 @@ struct NearBatch {
         for (int p = 0; p < 3; ++p) longitudinal[p] = field.longitudinal.gaussian[p];
         if (field.scattered) rows.set(field);
     }
-    /// S at four exits, all of them valid.
-    MEDULLA_HOT void eval(Four theta_r, Four phi, Four (&S)[Channels]) const noexcept {
+    /// S at a block of exits, all of them valid: first every place, then every sum, so that one waits for memory while
+    /// the next is on its way.
+    MEDULLA_HOT void eval(const float (&theta_r)[batch_block], const float (&phi)[batch_block],
+                          float (&S)[Channels][batch_block]) const noexcept {
+        constexpr int fours = batch_block / 4;
         const FurFibre<Channels>& fibre = *near.fibre;
         const Longitudinal<Channels>& m = near.longitudinal;
-        Four value[lobe_count];
-        for (int p = 0; p < 3; ++p)
-            value[p] = joint_pdf(longitudinal[p], fibre.azimuthal_gaussian[p], theta_r, phi - Four(near.centre[p]));
-        if (near.scattered) {
+        const auto& A = near.energy.A;
+        ExitPlaces around[2][fours], along[fours];
+        Four forwardness[fours];
+        for (int i = 0; near.scattered && i < fours; ++i) {
             const UnfoldedTables& tables = *fibre.tables;
-            const Four M = rows.longitudinal_densities(tables, m.theta_i < 0 ? -theta_r : theta_r,
-                                                       Four(2.0f) * magnitude(turns_of(phi)));
-            for (int p = 3; p < 5; ++p)
-                value[p] = M * rows.azimuthal_densities(tables, Four(near.side) * (phi - Four(near.centre[p])));
+            const Four azimuth = four_at(phi + 4 * i), theta = four_at(theta_r + 4 * i);
+            for (int p = 0; p < 2; ++p)
+                around[p][i] = exit_places(turns_of(Four(near.side) * (azimuth - Four(near.centre[3 + p]))),
+                                           Four(tables.azimuth_scale()));
+            along[i] = exit_places(turns_of(m.theta_i < 0 ? -theta : theta), Four(tables.longitude_scale()));
+            forwardness[i] = Four(2.0f) * magnitude(turns_of(azimuth));
         }
-        for (int c = 0; c < Channels; ++c) {
-            const auto& A = near.energy.A;
-            S[c] = Four(A[0][c]) * value[0] + Four(A[1][c]) * value[1] + Four(A[2][c]) * value[2];
-            if (near.scattered) S[c] = S[c] + (Four(A[3][c]) * value[3] + Four(A[4][c]) * value[4]);
-            S[c] = S[c] * Four(m.scale);
+        for (int i = 0; i < fours; ++i) {
+            const Four azimuth = four_at(phi + 4 * i), theta = four_at(theta_r + 4 * i);
+            Four value[3];
+            for (int p = 0; p < 3; ++p)
+                value[p] =
+                    joint_pdf(longitudinal[p], fibre.azimuthal_gaussian[p], theta, azimuth - Four(near.centre[p]));
+            for (int c = 0; c < Channels; ++c)
+                store_four(Four(A[0][c]) * value[0] + Four(A[1][c]) * value[1] + Four(A[2][c]) * value[2],
+                           S[c] + 4 * i);
+        }
+        for (int i = 0; near.scattered && i < fours; ++i) {
+            const UnfoldedTables& tables = *fibre.tables;
+            const Four M = rows.longitudinal_densities(tables, along[i], forwardness[i]);
+            const Four TTs = M * rows.azimuthal_densities(tables, around[0][i]),
+                       TRTs = M * rows.azimuthal_densities(tables, around[1][i]);
+            for (int c = 0; c < Channels; ++c)
+                store_four(four_at(S[c] + 4 * i) + (Four(A[3][c]) * TTs + Four(A[4][c]) * TRTs), S[c] + 4 * i);
         }
     }
 };
 
+/// The whole batch.
+template <int Channels>
+MEDULLA_FN void eval_exits(const NearField<Channels>& near, int count, const float* theta_r, const float* phi,
+                           Colour<Channels>* S) noexcept {
+    const NearBatch<Channels> batch(near);
+    for (int from = 0; from < count; from += batch_block) {
+        const int n = count - from < batch_block ? count - from : batch_block;
+        float theta[batch_block], azimuth[batch_block], factor[batch_block], value[Channels][batch_block];
+        for (int i = 0; i < batch_block; ++i) {
+            const int k = from + (i < n ? i : 0);
+            const bool valid = within(theta_r[k], float(pi / 2)) && within(phi[k], 1e4f);
+            theta[i] = valid ? theta_r[k] : 0.0f, azimuth[i] = valid ? phi[k] : 0.0f;
+            factor[i] = valid ? near.longitudinal.scale : 0.0f;
+        }
+        batch.eval(theta, azimuth, value);
+        for (int i = 0; i < n; ++i)
+            for (int c = 0; c < Channels; ++c) S[from + i].value[c] = value[c][i] * factor[i];
+    }
+}
+
 }  // namespace detail
 
 /// S of Eq. 12 at `count` exits, as near.eval(theta_r[i], phi[i]) but for rounding. Fastest where the fibre's tables
-/// are unfolded and `count` is a multiple of 4; fewer than 8 exits are asked one by one.
+/// are unfolded and `count` is a multiple of 16; fewer than 8 exits are asked one by one.
 template <int Channels>
 MEDULLA_FN void eval(const NearField<Channels>& near, int count, const float* theta_r, const float* phi,
                      Colour<Channels>* S) noexcept {
@@ -116,26 +153,32 @@ MEDULLA_FN void eval(const NearField<Channels>& near, int count, const float* th
         for (int i = 0; i < count; ++i) S[i] = near.eval(theta_r[i], phi[i]);
         return;
     }
-    const detail::NearBatch<Channels> batch(near);
-    for (int from = 0; from < count; from += 4) {
-        const int n = count - from < 4 ? count - from : 4;
-        bool good[4], all = n == 4;
-        for (int i = 0; i < n; ++i)
-            all &= good[i] = detail::within(theta_r[from + i], float(pi / 2)) && detail::within(phi[from + i], 1e4f);
-        Four theta, azimuth;
-        if (all) {
-            theta = four_at(theta_r + from), azimuth = four_at(phi + from);
-        } else {
-            float at[2][4] = {};
-            for (int i = 0; i < n; ++i)
-                if (good[i]) at[0][i] = theta_r[from + i], at[1][i] = phi[from + i];
-            theta = four_at(at[0]), azimuth = four_at(at[1]);
-        }
-        Four sum[Channels];
-        batch.eval(theta, azimuth, sum);
-        for (int i = 0; i < n; ++i)
-            for (int c = 0; c < Channels; ++c) S[from + i].value[c] = all || good[i] ? lane(sum[c], i) : 0.0f;
+    run_widest([&] { detail::eval_exits(near, count, theta_r, phi, S); });
+}
+
+namespace detail {
+
+template <int Channels>
+MEDULLA_FN void eval_queries(const FurFibre<Channels>& fibre, int count, const float* theta_i, const float* h,
+                             const float* theta_r, const float* phi, Colour<Channels>* S) noexcept {
+    NearField<Channels> near;
+    for (int i = 0; i < count; ++i) {
+        if (i == 0 || !(theta_i[i] == theta_i[i - 1]))
+            near_field(fibre, theta_i[i], h[i], near);
+        else if (!(h[i] == h[i - 1]))
+            set_offset(near, h[i]);
+        S[i] = near.eval(theta_r[i], phi[i]);
     }
+}
+
+}  // namespace detail
+
+/// S of Eq. 12 of `count` queries, each with its own light, offset and exit, as eval(fibre, theta_i[i], theta_r[i],
+/// phi[i], h[i]). What neighbours have in common, theta_i or theta_i and h, is prepared once.
+template <int Channels>
+MEDULLA_FN void eval(const FurFibre<Channels>& fibre, int count, const float* theta_i, const float* h,
+                     const float* theta_r, const float* phi, Colour<Channels>* S) noexcept {
+    run_widest([&] { detail::eval_queries(fibre, count, theta_i, h, theta_r, phi, S); });
 }
 
 }  // namespace medulla

@@ -22,8 +22,9 @@ enum class FarQuality : int { draft = -1, standard = 0, fine = 1 };
 namespace detail {
 
 inline constexpr int most_cuts = 40;
-/// Deviations to either side of a Gaussian's centre within which it is integrated: 1.4e-4 of it lies outside.
-inline constexpr float reach = 3.8f;
+/// Deviations to either side of a Gaussian's centre within which it is integrated, and what that leaves out: 1.4e-4 of
+/// the energy of every offset, which the rest then carries.
+inline constexpr float reach = 3.8f, within_reach = 1 / 0.99985530f;
 /// Above this deviation [radians] the whole circle is within reach, nearly, and no offset is skipped.
 inline constexpr float wide_deviation = 0.8f;
 
@@ -169,9 +170,12 @@ MEDULLA_FN void integrate_piece(const FarField<Channels>& far, float a, float b,
     }
 }
 
-/// Gauss rule for `deviations` of a Gaussian under one piece: errors of 3e-4 and less (docs/bcsdf.md).
-MEDULLA_FN int rule_for(float deviations) noexcept {
-    return deviations < 8 ? 0 : (deviations < 12 ? 1 : (deviations < 19 ? 2 : 3));
+/// Gauss rule for `deviations` of a Gaussian under one piece of `length` [radians]: errors of 3e-4 and less
+/// (docs/bcsdf.md). A long piece sees the amplitude fall to 0 at the fibre's rim.
+MEDULLA_FN int rule_for(float deviations, float length) noexcept {
+    const int amplitude = length < 1.2f ? 0 : (length < 2.4f ? 1 : 2);
+    const int gaussian = deviations < 7 ? 0 : (deviations < 12 ? 1 : (deviations < 19 ? 2 : 3));
+    return amplitude > gaussian ? amplitude : gaussian;
 }
 
 /// Calls visit(path, weight, D) for every four nodes in reach of phi for lobe p = 0, 1, 2: the average over the range
@@ -182,8 +186,10 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
     const WrappedGaussian<float>& gaussian = far.fibre().azimuthal_gaussian[p];
     const Cuts& cuts = far.cuts[p];
     const float s = gaussian.deviation, wide = reach * s;
+    const float whole = s > wide_deviation ? 1.0f : within_reach;
     const auto node = [&](const Path<Four>& path, Four weight) {
-        visit(path, weight, gaussian.pdf_of(Four(phi) - unscattered_centre(p, path.gamma_i, path.gamma_t)));
+        visit(path, weight * Four(whole),
+              gaussian.pdf_of(Four(phi) - unscattered_centre(p, path.gamma_i, path.gamma_t)));
     };
     float a = cuts.gamma[0];
     Exit at_a = exit_of(p, at.inverse_index, at.index_excess, a);
@@ -194,7 +200,7 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
         if (a < 0 && b > 0)
             slope = std::fmax(slope, std::abs(exit_of(p, at.inverse_index, at.index_excess, 0.0f).slope));
         if (s > wide_deviation) {
-            const int rule = rule_for(slope * (b - a) / s);
+            const int rule = rule_for(slope * (b - a) / s, b - a);
             integrate_piece(far, a, b, rule, node);
         } else {
             const float low = std::fmin(at_a.phi, at_b.phi), high = std::fmax(at_a.phi, at_b.phi);
@@ -213,7 +219,7 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
                 const float sa = ga == a ? at_a.slope : exit_of(p, at.inverse_index, at.index_excess, ga).slope;
                 const float sb = gb == b ? at_b.slope : exit_of(p, at.inverse_index, at.index_excess, gb).slope;
                 const float steepest = ga < 0 && gb > 0 && p == 2 ? slope : std::fmax(std::abs(sa), std::abs(sb));
-                integrate_piece(far, ga, gb, rule_for(steepest * (gb - ga) / s), node);
+                integrate_piece(far, ga, gb, rule_for(steepest * (gb - ga) / s, gb - ga), node);
             }
         }
         a = b, at_a = at_b;

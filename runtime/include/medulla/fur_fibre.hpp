@@ -147,6 +147,10 @@ MEDULLA_FN FurStatus prepare(const FurParameters<Channels>& p, const PackView& p
 /// Widest range of sqrt(sigma), upper over lower end, that four nodes are enough for: eta >= 1.165.
 inline constexpr float widest_root_range = 1.4f;
 
+/// Spans of theta_i next to 90 degrees that unfolding halves: there alone sigma and the lobes change fast enough that
+/// the cubic between the pack's own breakpoints errs by more than 1e-5 (by 1e-4 to 5e-4).
+inline constexpr std::uint32_t halved_spans = 5;
+
 /// Multiplies the material's tables out into `tables`, which `fibre` then reads instead of the factors; takes about
 /// 1 ms with the default pack. false, and the fibre reads its factors, where they do not fit: longer or fewer than 3
 /// spans of an axis, longitudinal tables on different axes or not up to 90 degrees, an axis of absorption, a sigma axis
@@ -166,21 +170,28 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
         return p.sigma_ms * p.kappa * p.eta / std::sqrt((p.eta - 1) * (p.eta + 1) + cos_i * cos_i);
     };
     const float low = held(std::sqrt(sigma_at(1))), high = held(std::sqrt(sigma_at(0)));
-    if (offset.spans > most_offset_spans || theta.spans < 3 || theta.spans > most_inclination_spans ||
+    if (offset.spans > most_offset_spans || theta.spans < 3 || theta.spans + halved_spans > most_inclination_spans ||
         phi.spans > most_exit_spans || theta_r.spans > most_exit_spans || high > widest_root_range * low ||
         low < sigma.lower() || theta.upper() < 1)
         return false;
     tables.offset.set_spline(offset);
-    tables.inclination.set_nodes(theta);
+    float node[most_inclination_spans + 1];
+    std::uint32_t nodes = 0;
+    for (std::uint32_t j = 0; j <= theta.spans; ++j) {
+        const float at = theta.breakpoint(std::int32_t(j));
+        if (j + halved_spans > theta.spans) node[nodes] = 0.5f * (node[nodes - 1] + at), ++nodes;
+        node[nodes++] = at;
+    }
+    tables.inclination.set_nodes(nodes - 1, node);
     tables.azimuth.set_spline(phi);
     tables.longitude.set_spline(theta_r);
 
-    const float node[4] = {0.03806023f, 0.30865828f, 0.69134172f, 0.96193977f};  // Chebyshev's on [0, 1]
+    const float chebyshev[4] = {0.03806023f, 0.30865828f, 0.69134172f, 0.96193977f};  // nodes on [0, 1]
     tables.least_root = low, tables.inverse_range = high > low ? 1 / (high - low) : 0;
-    tables.sigma_weights = cubic_weights([&](float t) { return lagrange_weights(node, t); });
+    tables.sigma_weights = cubic_weights([&](float t) { return lagrange_weights(chebyshev, t); });
     Contraction at_sigma, at;
     for (std::uint32_t s = 0; s < 4; ++s) {
-        const float root = low + node[s] * (high - low);
+        const float root = low + chebyshev[s] * (high - low);
         contract_axis(around.view, around.sigma_axis, root * root, around.weight, at_sigma.weight);
         for (std::uint32_t j = 0; j < offset.spans + 3; ++j) {
             scale_by_row(around.view, around.last_axis, j, at_sigma.weight, at.weight);
@@ -191,16 +202,21 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
             });
         }
     }
-    for (std::uint32_t j = 0; j <= theta.spans; ++j) {
-        const float theta_i = from_spline_coordinate(Quantity::theta_i, theta.breakpoint(std::int32_t(j)));
+    const std::uint32_t rows = tables.longitude_rows();
+    for (std::uint32_t j = 0; j < nodes; ++j) {
+        const float theta_i = from_spline_coordinate(Quantity::theta_i, node[j]);
         for (std::uint32_t side = 0; side < 2; ++side) {
             const MaterialTable& table = side == 0 ? back : forward;
             contract(table, sigma_at(std::cos(theta_i)), theta_i, at);
-            float* to = tables.longitudinal + std::size_t(j) * 4 * tables.longitude_rows() + side;
+            float* to = tables.longitudinal + std::size_t(j) * 4 * rows + side;
             detail::exit_coefficients(table.view, at.weight, [&](std::uint32_t k, float positive, float negative) {
-                to[2 * k] = positive * at.inverse_integral;
-                to[2 * (tables.longitude_rows() + k)] = negative * at.inverse_integral;
+                to[2 * k] = positive, to[2 * (rows + k)] = negative;
             });
+            // The lobe is held to >= 0 as it is read: what lies below counts as light, so that its integral is 1.
+            const float below = detail::dips(
+                theta_r, [&](std::uint32_t k, std::uint32_t negative) { return to[2 * (rows * negative + k)]; });
+            const float factor = at.inverse_integral / (1 + below * at.inverse_integral);
+            for (std::uint32_t k = 0; k < 2 * rows; ++k) to[2 * k] *= factor;
         }
     }
     fibre.tables = &tables;
@@ -455,15 +471,21 @@ MEDULLA_FN void offset_at(NearField<Channels>& near, float h) noexcept {
              near.azimuthal);
 }
 
+/// Sets `near`, whose fibre and longitudinal part are set, to an offset. @param h [fibre radii], in [-1, 1]; outside it
+/// every lobe is 0
+template <int Channels>
+MEDULLA_FN void set_offset(NearField<Channels>& near, float h) noexcept {
+    near.valid = near.scattered = false;
+    if (near.longitudinal.valid && detail::within(h, 1.0f)) offset_at(near, h);
+}
+
 /// @param h offset [fibre radii], in [-1, 1]; outside it every lobe is 0
 template <int Channels>
 MEDULLA_FN void near_field(const FurFibre<Channels>& fibre, float theta_i, float h,
                            NearField<Channels>& near) noexcept {
     near.fibre = &fibre;
-    near.valid = near.scattered = false;
     longitudinal_at(fibre, theta_i, near.longitudinal);
-    if (!near.longitudinal.valid || !detail::within(h, 1.0f)) return;
-    offset_at(near, h);
+    set_offset(near, h);
 }
 
 /// M and N of every lobe for one offset (the plain way in; keep a NearField where many exits are asked).

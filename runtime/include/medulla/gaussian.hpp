@@ -223,10 +223,12 @@ MEDULLA_FN WrappedGaussian<T> wrapped_gaussian(T deviation) noexcept {
 
 /// Draws an angle from the centre of the wrapped Gaussian (Box and Muller 1958), in [-pi, pi].
 /// @param u uniform in [0, 1)  @param v uniform in [0, 1)
+/// @param most deviations: beyond it, the second number of the pair, which is independent of the first, stands in
 template <class T>
-MEDULLA_FN T sample(const WrappedGaussian<T>& gaussian, T u, T v) noexcept {
+MEDULLA_FN T sample(const WrappedGaussian<T>& gaussian, T u, T v, T most = T(1e30)) noexcept {
     const T radius = std::sqrt(T(-2) * std::log(T(1) - u));  // 1 - u > 0
-    return wrap_angle(gaussian.deviation * radius * std::cos(T(2 * pi) * v));
+    const T z = radius * std::cos(T(2 * pi) * v);
+    return wrap_angle(gaussian.deviation * (magnitude(z) <= most ? z : radius * std::sin(T(2 * pi) * v)));
 }
 
 /// The truncated Gaussians of R, TT and TRT abreast; lane 3 is nobody's.

@@ -225,4 +225,26 @@ MEDULLA_FN float power_of_two(float k) noexcept {
 MEDULLA_FN float lane(float a, int) noexcept { return a; }
 MEDULLA_FN float sum_of(float a) noexcept { return a; }
 
+#if defined(MEDULLA_SSE2) && defined(__GNUC__) && !defined(__AVX2__) && !defined(__CUDACC__) && !defined(__HIPCC__)
+namespace detail {
+template <class F>
+__attribute__((target("avx2"), flatten)) void run_on_avx2(const F& f) noexcept {
+    f();
+}
+}  // namespace detail
+/// f(), compiled twice: for what the renderer is built for and, taken where the processor has it, for AVX2 with fused
+/// products. For work of microseconds, not for one number.
+template <class F>
+void run_widest(const F& f) noexcept {
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return detail::run_on_avx2(f);
+    f();
+}
+#else
+/// f(), as the renderer is built.
+template <class F>
+MEDULLA_FN void run_widest(const F& f) noexcept {
+    f();
+}
+#endif
+
 }  // namespace medulla

@@ -6,13 +6,14 @@
 #include <cmath>
 #include <cstdint>
 
+#include "medulla/held_integral.hpp"
 #include "medulla/lanes.hpp"
 #include "medulla/lookup.hpp"
 
 namespace medulla {
 
 /// Spans that there is room for; the default pack fits.
-inline constexpr std::uint32_t most_offset_spans = 24, most_inclination_spans = 56, most_exit_spans = 64;
+inline constexpr std::uint32_t most_offset_spans = 24, most_inclination_spans = 61, most_exit_spans = 64;
 
 /// Angles in turns, less whole ones, in [-1/2, 1/2]. @param y [radians], |y| < 1e9
 MEDULLA_HOT Four turns_of(Four y) noexcept {
@@ -84,22 +85,23 @@ struct CubicAxis {
 
     /// Rows are the pack's spline coefficients.
     MEDULLA_FN void set_spline(const AxisView<float>& axis) noexcept {
-        set(axis, [&](std::uint32_t i) {
-            span[i].first = i;
-            const float a = axis.breakpoint(std::int32_t(i)), b = axis.breakpoint(std::int32_t(i + 1));
-            return cubic_weights([&](float t) { return spline_weights(axis, Cell<float>{i, a + t * (b - a)}); });
-        });
+        set(
+            axis.spans, [&](std::uint32_t i) { return axis.breakpoint(std::int32_t(i)); },
+            [&](std::uint32_t i, float a, float b) {
+                span[i].first = i;
+                return cubic_weights([&](float t) { return spline_weights(axis, Cell<float>{i, a + t * (b - a)}); });
+            });
     }
-    /// Rows are values at the breakpoints, joined by the cubic through the four nearest; 3 spans and more.
-    MEDULLA_FN void set_nodes(const AxisView<float>& axis) noexcept {
-        set(axis, [&](std::uint32_t i) {
-            const std::uint32_t before = i > 0 ? i - 1 : 0, from = before + 3 <= axis.spans ? before : axis.spans - 3;
-            span[i].first = from;
-            float x[4];
-            for (std::uint32_t k = 0; k < 4; ++k) x[k] = axis.breakpoint(std::int32_t(from + k));
-            const float a = axis.breakpoint(std::int32_t(i)), b = axis.breakpoint(std::int32_t(i + 1));
-            return cubic_weights([&](float t) { return lagrange_weights(x, a + t * (b - a)); });
-        });
+    /// Rows are values at count + 1 ascending nodes, joined by the cubic through the four nearest; count >= 3.
+    MEDULLA_FN void set_nodes(std::uint32_t count, const float* node) noexcept {
+        set(
+            count, [&](std::uint32_t i) { return node[i]; },
+            [&](std::uint32_t i, float a, float b) {
+                const std::uint32_t before = i > 0 ? i - 1 : 0, from = before + 3 <= count ? before : count - 3;
+                span[i].first = from;
+                const float x[4] = {node[from], node[from + 1], node[from + 2], node[from + 3]};
+                return cubic_weights([&](float t) { return lagrange_weights(x, a + t * (b - a)); });
+            });
     }
     /// @param x a spline coordinate, held to the axis's ends; no NaN
     MEDULLA_HOT RowPoint at(float x) const noexcept {
@@ -116,15 +118,15 @@ struct CubicAxis {
     }
 
   private:
-    template <class F>
-    MEDULLA_FN void set(const AxisView<float>& axis, F&& weights_of) noexcept {
-        spans = axis.spans, lower = axis.lower(), upper = axis.upper();
+    template <class Breakpoint, class F>
+    MEDULLA_FN void set(std::uint32_t count, Breakpoint&& breakpoint, F&& weights_of) noexcept {
+        spans = count, lower = breakpoint(0), upper = breakpoint(count);
         // Rounding moves a place by 1e-4 stretches, so within 1e-3 of an end is the end; the cubic of the neighbouring
         // span is there the same to the third power of that.
         constexpr float near = 1e-3f;
         const auto on_ends = [&](std::int32_t n) {
             for (std::uint32_t i = 1; i < spans; ++i) {
-                const float u = (axis.breakpoint(std::int32_t(i)) - lower) * float(n) / (upper - lower);
+                const float u = (breakpoint(i) - lower) * float(n) / (upper - lower);
                 if (magnitude(u - nearest_integer(u)) > near) return false;
             }
             return true;
@@ -133,9 +135,9 @@ struct CubicAxis {
         while (stretches < most_stretches && !on_ends(stretches)) ++stretches;
         scale = float(stretches) / (upper - lower);
         for (std::uint32_t i = 0; i < spans; ++i) {
-            span[i].weights = weights_of(i);
-            span[i].low = (axis.breakpoint(std::int32_t(i)) - lower) * scale;
-            span[i].high = (axis.breakpoint(std::int32_t(i + 1)) - lower) * scale;
+            const float a = breakpoint(i), b = breakpoint(i + 1);
+            span[i].weights = weights_of(i, a, b);
+            span[i].low = (a - lower) * scale, span[i].high = (b - lower) * scale;
             span[i].inverse = 1 / (span[i].high - span[i].low);
         }
         std::uint32_t at = 0;
@@ -182,7 +184,7 @@ MEDULLA_HOT ExitPlaces exit_places(Four turns, Four scale) noexcept {
     return p;
 }
 
-/// The tables of one material, 136 KB in memory that the caller keeps for as long as the fibre that reads them.
+/// The tables of one material, 142 KB in memory that the caller keeps for as long as the fibre that reads them.
 struct UnfoldedTables {
     float least_root = 0, inverse_range = 0;  ///< sqrt(sigma) runs over [least_root, least_root + 1 / inverse_range]
     CubicWeights sigma_weights;               ///< of four Chebyshev nodes in it
@@ -277,16 +279,6 @@ struct UnfoldedTables {
 };
 
 namespace detail {
-
-/// Calls put(k, positive, negative) with the coefficients of the contracted lobe for y >= 0 and y < 0.
-template <class Put>
-MEDULLA_FN void exit_coefficients(const TableView& view, const float* weight, Put&& put) noexcept {
-    const std::uint32_t k = view.parameter_axes(), even = view.even_stride(), all = view.layout.rank_stride;
-    for (std::uint32_t row = 0; row < view.layout.axes[k].spans + 3; ++row) {
-        const float e = row_sum(view, k, row, weight, 0, even), o = row_sum(view, k, row, weight, even, all);
-        put(row, e + o, e - o);
-    }
-}
 
 /// integral over y of the contracted lobe.
 MEDULLA_FN float exit_integral(const TableView& view, const float* weight) noexcept {

@@ -22,16 +22,16 @@ struct ExitRows {
     MEDULLA_FN void set(const NearField<Channels>& near) noexcept {
         const UnfoldedTables& tables = *near.fibre->tables;
         const AzimuthalPoint& p = near.point;
-        const Four h[4] = {spread<0>(p.offset), spread<1>(p.offset), spread<2>(p.offset), spread<3>(p.offset)};
         const Four sigma = p.sigma * Four(p.inverse_integral);
+        const Four w0 = spread<0>(p.offset) * sigma, w1 = spread<1>(p.offset) * sigma, w2 = spread<2>(p.offset) * sigma,
+                   w3 = spread<3>(p.offset) * sigma;
         const std::uint32_t rows = 2 * tables.azimuth_rows(), step = 4 * rows;
         for (std::uint32_t k = 0; k < rows; k += 4) {
             Four at[4];
             for (std::uint32_t i = 0; i < 4; ++i) {
                 const float* r = p.rows + 4 * (k + i < rows ? k + i : k);
-                at[i] = ((h[0] * aligned_four_at(r) + h[1] * aligned_four_at(r + step)) +
-                         (h[2] * aligned_four_at(r + 2 * step) + h[3] * aligned_four_at(r + 3 * step))) *
-                        sigma;
+                at[i] = (w0 * aligned_four_at(r) + w1 * aligned_four_at(r + step)) +
+                        (w2 * aligned_four_at(r + 2 * step) + w3 * aligned_four_at(r + 3 * step));
             }
             transpose(at[0], at[1], at[2], at[3]);
             store_four((at[0] + at[1]) + (at[2] + at[3]), azimuthal + k);

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -113,7 +114,9 @@ void bench_lookups(const PackView& pack, const std::string& label, UnfoldedTable
     report("lookup, half of contracting and two angles, unfolded, rank " + rank,
            0.5 * time([&](const Query& x) {
                const AzimuthalPoint here = tables.azimuthal_at(tables.sigma_at(2.2f + 0.1f * x.theta_i), std::abs(x.h));
-               return tables.azimuthal_density(here, x.phi) + tables.azimuthal_density(here, x.theta_r);
+               float N[2];
+               tables.azimuthal_densities(here, x.phi, x.theta_r, N);
+               return N[0] + N[1];
            }),
            "ns", std::sqrt(error / norm));
 }
@@ -165,6 +168,40 @@ void bench_near(const FurFibre<3>& fibre, const std::string& how) {
                                sink = S[3].value[0];
                            }),
                "ns", relative);
+    std::vector<float> theta_i, h;
+    for (const Query& x : q) theta_i.push_back(x.theta_i), h.push_back(x.h);
+    report("near field, per query, batches of unlike (theta_i, h), " + how,
+           nanoseconds(int(q.size()),
+                       [&] {
+                           eval(fibre, int(q.size()), theta_i.data(), h.data(), theta_r.data(), phi.data(), S.data());
+                           sink = S[3].value[0];
+                       }),
+           "ns", relative);
+}
+
+/// What unfolding changes in C^M and in N of TTs and TRTs: the worst of the animals, relative L2 against the factors.
+void bench_unfolding(const PackView& pack, UnfoldedTables& tables) {
+    std::mt19937 engine(2);
+    std::uniform_real_distribution<float> u(0, 1);
+    double worst[2] = {};
+    for (const FurPreset& preset : fur_presets) {
+        FurFibre<3> slow;
+        prepare(parameters_of<3>(preset), pack, slow);
+        FurFibre<3> fast = slow;
+        if (!unfold(fast, tables)) continue;
+        double error[2] = {}, norm[2] = {};
+        for (int i = 0; i < 4000; ++i) {
+            const float theta_i = 3.1415f * (u(engine) - 0.5f), phi = 6.2831f * u(engine), h = 2 * u(engine) - 1;
+            const float theta_r = std::max(-1.5707f, std::min(1.5707f, 1.2f * (u(engine) - 0.5f) - theta_i));
+            const auto a = near_lobes(fast, theta_i, theta_r, phi, h), b = near_lobes(slow, theta_i, theta_r, phi, h);
+            error[0] += std::pow(double(a.M[3] - b.M[3]), 2), norm[0] += std::pow(double(b.M[3]), 2);
+            for (int k = 3; k < 5; ++k)
+                error[1] += std::pow(double(a.N[k][0] - b.N[k][0]), 2), norm[1] += std::pow(double(b.N[k][0]), 2);
+        }
+        for (int k = 0; k < 2; ++k) worst[k] = std::max(worst[k], std::sqrt(error[k] / norm[k]));
+    }
+    report("unfolding, error in C^M, worst animal", worst[0], "");
+    report("unfolding, error in N of TTs and TRTs, worst animal", worst[1], "");
 }
 
 /// Mean of the double-precision near field over [-1, 1], as tests/test_bcsdf_far.cpp has it.
@@ -453,6 +490,7 @@ int main(int argc, char** argv) {
     bench_near(fibre, "factors");
     report("unfolding a material", nanoseconds(1, [&] { sink = unfold(fibre, tables[0]) ? 1.0f : 0.0f; }) / 1000, "us");
     bench_near(fibre, "unfolded");
+    bench_unfolding(opened.pack, *std::make_unique<UnfoldedTables>());
     bench_far(opened.pack);
     bench_sampling(fibre);
     if (json_file.empty()) return 0;

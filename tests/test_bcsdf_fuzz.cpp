@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <memory>
 #include <random>
 
 #include "analytic_pack.hpp"
@@ -75,10 +76,11 @@ TEST_CASE("far field of a dense medulla that reaches the rim, next to grazing li
 
 TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
     const analytic::AnalyticPack pack;
-    const char* wanted = std::getenv("MEDULLA_FUZZ");  // fibres; each is asked 77 times, near, far, by samples
+    const char* wanted = std::getenv("MEDULLA_FUZZ");  // fibres; each is asked 85 times, near, far, by samples
     const long fibres = wanted ? std::atol(wanted) : 2500;
     Inputs in(7);
-    long usable_fibres = 0, evaluated = 0, bright = 0, bad = 0;
+    const auto tables = std::make_unique<UnfoldedTables>();
+    long unfolded = 0, usable_fibres = 0, evaluated = 0, bright = 0, bad = 0;
     for (long i = 0; i < fibres; ++i) {
         FurParameters<3> p;
         p.eta = in.mostly(1.0001f, 2.5f), p.kappa = in.mostly(0, 1), p.alpha = in.mostly(-0.3f, 0.3f);
@@ -88,6 +90,7 @@ TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
         p.fresnel = in.uniform() < 0.5f ? Fresnel::bravais : Fresnel::exact;
         FurFibre<3> fibre;
         usable_fibres += usable(prepare(p, pack.view, fibre));
+        if (i % 8 == 1) unfolded += unfold(fibre, *tables);
         const auto check = [&](float x, const char* what) {
             ++evaluated, bright += x > 0;
             if (good(x)) return;
@@ -100,8 +103,15 @@ TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
             const float theta_i = in.any(-1.5707f, 1.5707f), h = in.any(-1, 1);
             NearField<3> near;
             near_field(fibre, theta_i, h, near);
-            for (int j = 0; j < 8; ++j)
-                for (float x : near.eval(in.any(-1.5707f, 1.5707f), in.any(-7, 7)).value) check(x, "near");
+            float theta_r[8], phi[8];
+            for (int j = 0; j < 8; ++j) {
+                theta_r[j] = in.any(-1.5707f, 1.5707f), phi[j] = in.any(-7, 7);
+                for (float x : near.eval(theta_r[j], phi[j]).value) check(x, "near");
+            }
+            Colour<3> S[8];
+            eval(near, 8, theta_r, phi, S);
+            for (const Colour<3>& at : S)
+                for (float x : at.value) check(x, "batch");
             if (k < 1) {
                 NearSampler<3> sampler;
                 sampler.prepare(near);
@@ -128,8 +138,9 @@ TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
                             b = {in.any(-1, 1), in.any(-1, 1), in.any(-1, 1)};
         for (float x : eval(fibre, a, b, in.any(-1, 1)).value) check(x, "directions");
     }
-    if (wanted) std::printf("%ld inputs, %ld values, %ld of them > 0, %ld bad\n", 77 * fibres, evaluated, bright, bad);
+    if (wanted) std::printf("%ld inputs, %ld values, %ld of them > 0, %ld bad\n", 85 * fibres, evaluated, bright, bad);
     CHECK(bad == 0);
     CHECK(usable_fibres > fibres / 4);
+    CHECK(unfolded > fibres / 64);
     CHECK(bright > evaluated / 20);
 }

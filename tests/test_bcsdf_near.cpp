@@ -94,6 +94,35 @@ TEST_CASE("near field equals the double-precision twin", "[bcsdf]") {
     CHECK(compared > 10000);
 }
 
+TEST_CASE("Gaussians of three lobes abreast are what they are one by one", "[bcsdf]") {
+    std::mt19937 random(4);
+    std::uniform_real_distribution<float> u(0, 1);
+    for (int i = 0; i < 4000; ++i) {
+        const float theta_i = i % 5 ? 3.1415925f * (u(random) - 0.5f) : 1.5707963f, alpha = i % 3 ? 0.1f : 1.5f;
+        const float beta = 1e-4f * std::pow(4e4f, u(random)), theta_r = 3.1415925f * (u(random) - 0.5f);
+        const float centre[4] = {alpha - theta_i, -0.5f * alpha - theta_i, -1.5f * alpha - theta_i, 0};
+        const auto M = truncated_gaussians(four_at(centre), Four(beta, 0.5f * beta, 1.5f * beta, 1));
+        const WrappedGaussians D = wrapped_gaussians(beta, 1.4f * beta, 1.7f * beta);
+        const float phi = 20 * (u(random) - 0.5f);
+        const Four m = M.pdf(theta_r), d = D.pdf(four_at(centre), phi),
+                   joint = joint_pdf(M, D, four_at(centre), theta_r, phi);
+        for (int p = 0; p < 3; ++p) {
+            const auto one = truncated_gaussian(centre[p], (p == 0 ? 1.0f : (p == 1 ? 0.5f : 1.5f)) * beta);
+            CHECK(M[p].origin == one.origin);
+            CHECK(M[p].beyond == one.beyond);
+            CHECK(double(M[p].peak) == Approx(double(one.peak)).epsilon(1e-6));  // a few roundings
+            // An exponent of up to 87 rounded twice to 6e-8.
+            CHECK(double(lane(m, p)) == Approx(double(one.pdf(theta_r))).epsilon(1.1e-5).margin(1e-30));
+            // z = x / deviation is rounded alike; turns are counted from the nearest of each.
+            const double tolerance = 1e-5 + 2e-5 / double(beta);  // as near_lobes against its twin
+            CHECK(double(lane(d, p)) == Approx(double(D[p].pdf(phi - centre[p]))).epsilon(tolerance).margin(1e-12));
+            CHECK(double(lane(joint, p)) ==
+                  Approx(double(lane(m, p)) * double(lane(d, p))).epsilon(1.1e-5).margin(1e-30));
+        }
+        CHECK(lane(d, 3) == 0);
+    }
+}
+
 TEST_CASE("kappa = 0 is exactly the hair model and reads no table", "[bcsdf]") {
     FurParameters<3> p = parameters_of<3>(*find_preset("human"));
     p.kappa = 0;

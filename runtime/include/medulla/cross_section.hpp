@@ -77,8 +77,10 @@ MEDULLA_FN Path<T> trace(const Inclination<S>& at, S kappa, S layers, T h, T cos
     const T x = square_root(T(at.index_excess) + cos_i * cos_i), zero = T(S(0));
     const T sin_t = h * T(at.inverse_index), cos_t = x * T(at.inverse_index);
     path.h_inside = sin_t;
-    path.gamma_i = real_math::angle(h, cos_i);
-    path.gamma_t = real_math::angle(sin_t, cos_t);
+    const T sines[2] = {h, sin_t}, cosines[2] = {cos_i, cos_t};
+    T gamma[2];
+    real_math::angles(sines, cosines, gamma);
+    path.gamma_i = gamma[0], path.gamma_t = gamma[1];
     const T s2 = (T(kappa) - sin_t) * (T(kappa) + sin_t);
     const auto inside = s2 > zero;
     path.s_m = choose(inside, square_root(choose(inside, s2, T(S(1)))), zero);  // no root of 0: it has no derivative
@@ -124,8 +126,9 @@ MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, T>& 
     a.medulla_scattering = p.sigma_ms * inverse_cos_t;
     for (int c = 0; c < Channels; ++c) {
         a.cortex[c] = p.sigma_ca[c] * inverse_cos_t;
-        a.T_b[c] = real_math::exponential(-(medulla + (T(1) - p.kappa) * a.cortex[c]));
+        a.T_b[c] = -(medulla + (T(1) - p.kappa) * a.cortex[c]);
     }
+    real_math::exponentials(a.T_b);
     return a;
 }
 
@@ -139,13 +142,15 @@ struct Energies {
 template <int Channels, class T, class S>
 MEDULLA_FN Energies<Channels, T> energies(const Path<T>& path, const Absorption<Channels, S>& a,
                                           bool scattered) noexcept {
-    using real_math::exponential;
     Energies<Channels, T> e;
-    const T F = path.cuticle.F, passed = path.cuticle.T_;
-    const T m = exponential(-path.s_m * T(a.medulla_extinction));
-    const T E = scattered ? real_math::absorbed(path.s_m * T(S(2) * a.medulla_scattering)) : T(S(0));
+    const T F = path.cuticle.F, passed = path.cuticle.T_, depth = path.s_m * T(S(2) * a.medulla_scattering);
+    T left[Channels + 2];  // after half-lengths of cortex, of medulla, and a chord's scattering alone
+    for (int c = 0; c < Channels; ++c) left[c] = -path.s_c * T(a.cortex[c]);
+    left[Channels] = -path.s_m * T(a.medulla_extinction), left[Channels + 1] = -depth;
+    real_math::exponentials(left);
+    const T m = left[Channels], E = scattered ? real_math::absorbed(depth, left[Channels + 1]) : T(S(0));
     for (int c = 0; c < Channels; ++c) {
-        const T q = exponential(-path.s_c * T(a.cortex[c])), through = (q * m) * (q * m);
+        const T q = left[c], through = (q * m) * (q * m);
         const T s = passed * q * T(a.T_b[c]) * E;
         e.A[0][c] = F;
         e.A[1][c] = passed * passed * through;

@@ -22,8 +22,9 @@ enum class FarQuality : int { draft = -1, standard = 0, fine = 1 };
 namespace detail {
 
 inline constexpr int most_cuts = 40;
-/// Deviations to either side of a Gaussian's centre within which it is integrated: 1.4e-4 of it lies outside.
-inline constexpr float reach = 3.8f;
+/// Deviations to either side of a Gaussian's centre within which it is integrated, and what that leaves out: 1.4e-4 of
+/// the energy of every offset, which the rest then carries.
+inline constexpr float reach = 3.8f, within_reach = 1 / 0.99985530f;
 /// Above this deviation [radians] the whole circle is within reach, nearly, and no offset is skipped.
 inline constexpr float wide_deviation = 0.8f;
 
@@ -67,8 +68,7 @@ struct FarField {
     detail::Cuts cuts[3];                 ///< of R, TT, TRT
     int nodes = 0;                        ///< scattering nodes
     ScatteringNode<Channels> node[most_scattering_nodes];
-    Four sigma_point;              ///< where sigma lies in unfolded tables, if the fibre has them
-    float sigma_weight[max_rank];  ///< else the azimuthal table contracted to it and to the absorption
+    float sigma_weight[max_rank];  ///< without unfolded tables: the azimuthal one contracted to sigma and absorption
 
     MEDULLA_FN const FurFibre<Channels>& fibre() const noexcept { return *near.fibre; }
     MEDULLA_FN LobeValues<Channels> lobes(float theta_r, float phi) const noexcept;
@@ -170,9 +170,12 @@ MEDULLA_FN void integrate_piece(const FarField<Channels>& far, float a, float b,
     }
 }
 
-/// Gauss rule for `deviations` of a Gaussian under one piece: errors of 3e-4 and less (docs/bcsdf.md).
-MEDULLA_FN int rule_for(float deviations) noexcept {
-    return deviations < 8 ? 0 : (deviations < 12 ? 1 : (deviations < 19 ? 2 : 3));
+/// Gauss rule for `deviations` of a Gaussian under one piece of `length` [radians]: errors of 3e-4 and less
+/// (docs/bcsdf.md). A long piece sees the amplitude fall to 0 at the fibre's rim.
+MEDULLA_FN int rule_for(float deviations, float length) noexcept {
+    const int amplitude = length < 1.2f ? 0 : (length < 2.4f ? 1 : 2);
+    const int gaussian = deviations < 7 ? 0 : (deviations < 12 ? 1 : (deviations < 19 ? 2 : 3));
+    return amplitude > gaussian ? amplitude : gaussian;
 }
 
 /// Calls visit(path, weight, D) for every four nodes in reach of phi for lobe p = 0, 1, 2: the average over the range
@@ -183,8 +186,10 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
     const WrappedGaussian<float>& gaussian = far.fibre().azimuthal_gaussian[p];
     const Cuts& cuts = far.cuts[p];
     const float s = gaussian.deviation, wide = reach * s;
+    const float whole = s > wide_deviation ? 1.0f : within_reach;
     const auto node = [&](const Path<Four>& path, Four weight) {
-        visit(path, weight, gaussian.pdf_of(Four(phi) - unscattered_centre(p, path.gamma_i, path.gamma_t)));
+        visit(path, weight * Four(whole),
+              gaussian.pdf_of(Four(phi) - unscattered_centre(p, path.gamma_i, path.gamma_t)));
     };
     float a = cuts.gamma[0];
     Exit at_a = exit_of(p, at.inverse_index, at.index_excess, a);
@@ -195,7 +200,7 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
         if (a < 0 && b > 0)
             slope = std::fmax(slope, std::abs(exit_of(p, at.inverse_index, at.index_excess, 0.0f).slope));
         if (s > wide_deviation) {
-            const int rule = rule_for(slope * (b - a) / s);
+            const int rule = rule_for(slope * (b - a) / s, b - a);
             integrate_piece(far, a, b, rule, node);
         } else {
             const float low = std::fmin(at_a.phi, at_b.phi), high = std::fmax(at_a.phi, at_b.phi);
@@ -214,7 +219,7 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
                 const float sa = ga == a ? at_a.slope : exit_of(p, at.inverse_index, at.index_excess, ga).slope;
                 const float sb = gb == b ? at_b.slope : exit_of(p, at.inverse_index, at.index_excess, gb).slope;
                 const float steepest = ga < 0 && gb > 0 && p == 2 ? slope : std::fmax(std::abs(sa), std::abs(sb));
-                integrate_piece(far, ga, gb, rule_for(steepest * (gb - ga) / s), node);
+                integrate_piece(far, ga, gb, rule_for(steepest * (gb - ga) / s, gb - ga), node);
             }
         }
         a = b, at_a = at_b;
@@ -349,12 +354,10 @@ MEDULLA_FN void far_field(const FurFibre<Channels>& fibre, float theta_i, Offset
     far.gamma_rim = angle(far.rim);
     detail::place_cuts(far);
     if (!fibre.scattered) return;
-    const float sigma = far.near.longitudinal.sigma;
-    if (fibre.tables != nullptr) {
-        far.sigma_point = fibre.tables->sigma_at(sigma);
-    } else {
-        const float* weight = weights_at(fibre.azimuthal, far.near.longitudinal.absorbed, far.sigma_weight);
-        contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, sigma, weight, far.sigma_weight);
+    if (fibre.tables == nullptr) {
+        const Longitudinal<Channels>& m = far.near.longitudinal;
+        const float* weight = weights_at(fibre.azimuthal, m.absorbed, far.sigma_weight);
+        contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, m.sigma, weight, far.sigma_weight);
     }
     detail::place_scattering_nodes(far);
 }
@@ -392,11 +395,11 @@ MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, floa
     for (int i = 0; i < far.nodes; ++i) {
         const ScatteringNode<Channels>& n = far.node[i];
         if (unfolded != nullptr) {
-            const AzimuthalPoint at = unfolded->azimuthal_at(far.sigma_point, n.offset);
-            for (int p = 0; p < 2; ++p) {
-                const float D = unfolded->azimuthal_density(at, n.side * (phi - n.centre[p]));
-                for (int c = 0; c < Channels; ++c) N[p][c] += n.A[p][c] * D;
-            }
+            const AzimuthalPoint at = unfolded->azimuthal_at(far.near.longitudinal.sigma_point, n.offset);
+            float D[2];
+            unfolded->azimuthal_densities(at, n.side * (phi - n.centre[0]), n.side * (phi - n.centre[1]), D);
+            for (int p = 0; p < 2; ++p)
+                for (int c = 0; c < Channels; ++c) N[p][c] += n.A[p][c] * D[p];
             continue;
         }
         contract_axis(table.view, table.last_axis, last_point(table, n.offset), far.sigma_weight, contraction.weight);

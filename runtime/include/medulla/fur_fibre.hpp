@@ -105,9 +105,9 @@ template <int Channels = 3>
 struct FurFibre {
     FurParameters<Channels> parameters;
     FurStatus status = FurStatus::bad_eta;
-    bool scattered = false;                             ///< whether there are scattered lobes to read
-    float shift[3] = {}, deviation[3] = {};             ///< alpha_p, beta_p of Table 2 [radians]
-    WrappedGaussian<float> azimuthal_gaussian[3] = {};  ///< variance (p + 1) beta_n^2 (Eq. 16)
+    bool scattered = false;                    ///< whether there are scattered lobes to read
+    Four shift, deviation;                     ///< alpha_p, beta_p of Table 2 [radians]; lane 3 is nobody's
+    WrappedGaussians azimuthal_gaussian = {};  ///< variance (p + 1) beta_n^2 (Eq. 16)
     MaterialTable azimuthal, back, forward;
     bool paired = false;                     ///< whether `back` and `forward` have the same axes
     TableView survival;                      ///< where the pack knows what the medulla's absorption leaves
@@ -124,12 +124,9 @@ MEDULLA_FN FurStatus prepare(const FurParameters<Channels>& p, const PackView& p
     fibre.tables = nullptr;
     fibre.status = check(p);
     if (!usable(fibre.status)) return fibre.status;
-    const float shift[3] = {1.0f, -0.5f, -1.5f}, rough[3] = {1.0f, 0.5f, 1.5f};
-    for (int lobe = 0; lobe < 3; ++lobe) {
-        fibre.shift[lobe] = shift[lobe] * p.alpha;
-        fibre.deviation[lobe] = rough[lobe] * p.beta_m;
-        fibre.azimuthal_gaussian[lobe] = wrapped_gaussian(std::sqrt(float(lobe + 1)) * p.beta_n);
-    }
+    fibre.shift = Four(1.0f, -0.5f, -1.5f, 0.0f) * Four(p.alpha);
+    fibre.deviation = Four(1.0f, 0.5f, 1.5f, 1.0f) * Four(p.beta_m);
+    fibre.azimuthal_gaussian = wrapped_gaussians(p.beta_n, std::sqrt(2.0f) * p.beta_n, std::sqrt(3.0f) * p.beta_n);
     if (!(p.kappa > 0 && p.sigma_ms > 0)) return fibre.status;
     const TableView& azimuthal = pack[TableKind::azimuthal];
     const TableView& back = pack[TableKind::longitudinal_back];
@@ -150,6 +147,10 @@ MEDULLA_FN FurStatus prepare(const FurParameters<Channels>& p, const PackView& p
 /// Widest range of sqrt(sigma), upper over lower end, that four nodes are enough for: eta >= 1.165.
 inline constexpr float widest_root_range = 1.4f;
 
+/// Spans of theta_i next to 90 degrees that unfolding halves: there alone sigma and the lobes change fast enough that
+/// the cubic between the pack's own breakpoints errs by more than 1e-5 (by 1e-4 to 5e-4).
+inline constexpr std::uint32_t halved_spans = 5;
+
 /// Multiplies the material's tables out into `tables`, which `fibre` then reads instead of the factors; takes about
 /// 1 ms with the default pack. false, and the fibre reads its factors, where they do not fit: longer or fewer than 3
 /// spans of an axis, longitudinal tables on different axes or not up to 90 degrees, an axis of absorption, a sigma axis
@@ -169,21 +170,28 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
         return p.sigma_ms * p.kappa * p.eta / std::sqrt((p.eta - 1) * (p.eta + 1) + cos_i * cos_i);
     };
     const float low = held(std::sqrt(sigma_at(1))), high = held(std::sqrt(sigma_at(0)));
-    if (offset.spans > most_offset_spans || theta.spans < 3 || theta.spans > most_inclination_spans ||
+    if (offset.spans > most_offset_spans || theta.spans < 3 || theta.spans + halved_spans > most_inclination_spans ||
         phi.spans > most_exit_spans || theta_r.spans > most_exit_spans || high > widest_root_range * low ||
         low < sigma.lower() || theta.upper() < 1)
         return false;
     tables.offset.set_spline(offset);
-    tables.inclination.set_nodes(theta);
+    float node[most_inclination_spans + 1];
+    std::uint32_t nodes = 0;
+    for (std::uint32_t j = 0; j <= theta.spans; ++j) {
+        const float at = theta.breakpoint(std::int32_t(j));
+        if (j + halved_spans > theta.spans) node[nodes] = 0.5f * (node[nodes - 1] + at), ++nodes;
+        node[nodes++] = at;
+    }
+    tables.inclination.set_nodes(nodes - 1, node);
     tables.azimuth.set_spline(phi);
     tables.longitude.set_spline(theta_r);
 
-    const float node[4] = {0.03806023f, 0.30865828f, 0.69134172f, 0.96193977f};  // Chebyshev's on [0, 1]
+    const float chebyshev[4] = {0.03806023f, 0.30865828f, 0.69134172f, 0.96193977f};  // nodes on [0, 1]
     tables.least_root = low, tables.inverse_range = high > low ? 1 / (high - low) : 0;
-    tables.sigma_weights = cubic_weights([&](float t) { return lagrange_weights(node, t); });
+    tables.sigma_weights = cubic_weights([&](float t) { return lagrange_weights(chebyshev, t); });
     Contraction at_sigma, at;
     for (std::uint32_t s = 0; s < 4; ++s) {
-        const float root = low + node[s] * (high - low);
+        const float root = low + chebyshev[s] * (high - low);
         contract_axis(around.view, around.sigma_axis, root * root, around.weight, at_sigma.weight);
         for (std::uint32_t j = 0; j < offset.spans + 3; ++j) {
             scale_by_row(around.view, around.last_axis, j, at_sigma.weight, at.weight);
@@ -194,16 +202,21 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
             });
         }
     }
-    for (std::uint32_t j = 0; j <= theta.spans; ++j) {
-        const float theta_i = from_spline_coordinate(Quantity::theta_i, theta.breakpoint(std::int32_t(j)));
+    const std::uint32_t rows = tables.longitude_rows();
+    for (std::uint32_t j = 0; j < nodes; ++j) {
+        const float theta_i = from_spline_coordinate(Quantity::theta_i, node[j]);
         for (std::uint32_t side = 0; side < 2; ++side) {
             const MaterialTable& table = side == 0 ? back : forward;
             contract(table, sigma_at(std::cos(theta_i)), theta_i, at);
-            float* to = tables.longitudinal + std::size_t(j) * 4 * tables.longitude_rows() + side;
+            float* to = tables.longitudinal + std::size_t(j) * 4 * rows + side;
             detail::exit_coefficients(table.view, at.weight, [&](std::uint32_t k, float positive, float negative) {
-                to[2 * k] = positive * at.inverse_integral;
-                to[2 * (tables.longitude_rows() + k)] = negative * at.inverse_integral;
+                to[2 * k] = positive, to[2 * (rows + k)] = negative;
             });
+            // The lobe is held to >= 0 as it is read: what lies below counts as light, so that its integral is 1.
+            const float below = detail::dips(
+                theta_r, [&](std::uint32_t k, std::uint32_t negative) { return to[2 * (rows * negative + k)]; });
+            const float factor = at.inverse_integral / (1 + below * at.inverse_integral);
+            for (std::uint32_t k = 0; k < 2 * rows; ++k) to[2 * k] *= factor;
         }
     }
     fibre.tables = &tables;
@@ -240,11 +253,13 @@ template <int Channels = 3>
 struct Longitudinal {
     bool valid = false;
     float theta_i = 0;
+    float scale = 0;     ///< 1 / cos^2 theta_i of Eq. 12
     float sigma = 0;     ///< optical radius sigma_ms kappa / cos theta_t [1]
     float absorbed = 0;  ///< optical radius of absorption, sigma_ma kappa / cos theta_t [1]
     Inclination<float> at = {};
     Absorption<Channels> absorption = {};
-    TruncatedGaussian<float> gaussian[3] = {};
+    TruncatedGaussians gaussian = {};
+    Four sigma_point;           ///< where sigma lies in unfolded tables; set where
     LongitudinalPoint point;    ///< set where the fibre scatters and its tables are unfolded
     Contraction back, forward;  ///< set where the fibre scatters and they are not
     Contraction survival;       ///< of the axes before h, where the fibre has such a table
@@ -275,9 +290,10 @@ MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, 
     if (!(cos_i >= least_cosine)) return;
     m.valid = true;
     m.theta_i = theta_i;
+    m.scale = 1 / (cos_i * cos_i);
     m.at = inclination(fibre.parameters.eta, cos_i, fibre.parameters.fresnel);
     m.absorption = absorption(fibre.parameters, m.at.inverse_cos_t, static_cast<bool>(fibre.survival));
-    for (int p = 0; p < 3; ++p) m.gaussian[p] = truncated_gaussian(fibre.shift[p] - theta_i, fibre.deviation[p]);
+    m.gaussian = truncated_gaussians(fibre.shift - Four(theta_i), fibre.deviation);
     m.sigma = fibre.parameters.sigma_ms * fibre.parameters.kappa * m.at.inverse_cos_t;
     m.absorbed = fibre.parameters.sigma_ma * fibre.parameters.kappa * m.at.inverse_cos_t;
     if (!fibre.scattered) return;
@@ -287,33 +303,44 @@ MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, 
         for (std::uint32_t k = 0; k < 3; ++k)
             contract_axis(fibre.survival, k, at[k], m.survival.weight, m.survival.weight);
     }
-    if (fibre.tables != nullptr)
-        m.point = fibre.tables->longitudinal_at(std::abs(theta_i));
-    else
-        contract_longitudinal(fibre, theta_i, m);
+    if (fibre.tables == nullptr) return contract_longitudinal(fibre, theta_i, m);
+    m.sigma_point = fibre.tables->sigma_at(m.sigma);
+    m.point = fibre.tables->longitudinal_at(std::abs(theta_i));
 }
 
-/// M of the three unscattered lobes and, where `scattered`, M^s (Eq. 19): lerp over |phi| / pi of C^M back and forward.
+/// M^s of Eq. 19, from its two sides at |phi| / pi.
+MEDULLA_HOT float blend_sides(BackForward side, float forwardness) noexcept {
+    return (1 - forwardness) * side.back + forwardness * side.forward;
+}
+
+/// C^M back and forward straight from the factors. @param theta_r seen from the side of theta_i
+template <int Channels>
+MEDULLA_FN BackForward contracted_sides(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m,
+                                        float theta_r) noexcept {
+    const ExitPoint at_back = exit_point(fibre.back, theta_r);
+    const ExitPoint at_forward = fibre.paired ? at_back : exit_point(fibre.forward, theta_r);
+    const float back = signed_lobe(fibre.back.view, m.back, at_back);
+    const float forward = signed_lobe(fibre.forward.view, m.forward, at_forward);
+    return {back < 0 ? 0.0f : back, forward < 0 ? 0.0f : forward};
+}
+
+/// M of the three unscattered lobes and, where `scattered`, M^s.
 template <int Channels>
 MEDULLA_FN void longitudinal_lobes(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m, float theta_r,
                                    float phi, bool scattered, LobeValues<Channels>& lobes) noexcept {
-    const Four M = pdf_of_three(m.gaussian, theta_r);
+    const Four M = m.gaussian.pdf(theta_r);
     for (int p = 0; p < 3; ++p) lobes.M[p] = lane(M, p);
     if (!scattered) return;
     const float side = m.theta_i < 0 ? -theta_r : theta_r;
-    const float t = std::abs(wrap_angle(phi)) * float(1 / pi);
-    if (fibre.tables != nullptr) {
-        const BackForward at = fibre.tables->longitudinal_density(m.point, side);
-        lobes.M[3] = lobes.M[4] = (1 - t) * at.back + t * at.forward;
-        return;
-    }
-    const TableView &back_view = fibre.back.view, &forward_view = fibre.forward.view;
-    const ExitPoint at_back = exit_point(fibre.back, side);
-    const ExitPoint at_forward = fibre.paired ? at_back : exit_point(fibre.forward, side);
-    const float back = signed_lobe(back_view, m.back, at_back);
-    const float forward = signed_lobe(forward_view, m.forward, at_forward);
-    lobes.M[3] = lobes.M[4] = (1 - t) * (back < 0 ? 0.0f : back) + t * (forward < 0 ? 0.0f : forward);
+    const BackForward sides =
+        fibre.tables ? fibre.tables->longitudinal_density(m.point, side) : contracted_sides(fibre, m, side);
+    lobes.M[3] = lobes.M[4] = blend_sides(sides, std::abs(wrap_angle(phi)) * float(1 / pi));
 }
+
+/// Densities of TTs and TRTs at an exit, without their energies.
+struct ScatteredDensities {
+    float M = 0, D[2] = {};  ///< longitudinal and azimuthal [1 / radian]
+};
 
 /// The fibre lit from theta_i at offset h: what is left is a function of the exit (theta_r, phi).
 template <int Channels = 3>
@@ -331,25 +358,55 @@ struct NearField {
     /// M and N of every lobe at (theta_r, phi) [radians]; all 0 outside theta_r in [-pi/2, pi/2] or for |phi| > 1e4.
     MEDULLA_FN LobeValues<Channels> lobes(float theta_r, float phi) const noexcept {
         LobeValues<Channels> result;
-        if (!valid || !detail::within(theta_r, float(pi / 2)) || !detail::within(phi, 1e4f)) return result;
-        longitudinal_lobes(*fibre, longitudinal, theta_r, phi, scattered, result);
-        const Four D = pdf_of_three(fibre->azimuthal_gaussian, centre, phi);
-        for (int p = 0; p < 3; ++p)
-            for (int c = 0; c < Channels; ++c) result.N[p][c] = energy.A[p][c] * lane(D, p);
-        for (int p = 3; scattered && p < 5; ++p) {
-            const float y = side * (phi - centre[p]);
-            const float density =
-                fibre->tables ? fibre->tables->azimuthal_density(point, y) : lobe(fibre->azimuthal, azimuthal, y);
+        if (!answers(theta_r, phi)) return result;
+        const ScatteredDensities s = scattered_densities(theta_r, phi);
+        const Four M = longitudinal.gaussian.pdf(theta_r), D = fibre->azimuthal_gaussian.pdf(four_at(centre), phi);
+        for (int p = 0; p < lobe_count; ++p) {
+            const float density = p < 3 ? lane(D, p) : s.D[p - 3];
+            result.M[p] = p < 3 ? lane(M, p) : s.M;
             for (int c = 0; c < Channels; ++c) result.N[p][c] = energy.A[p][c] * density;
         }
         return result;
     }
     /// S of Eq. 12.
     MEDULLA_FN Colour<Channels> eval(float theta_r, float phi) const noexcept {
-        Colour<Channels> sum = angular_density(lobes(theta_r, phi));
-        const float cosine = longitudinal.at.cos_i;
-        for (int c = 0; valid && c < Channels; ++c) sum.value[c] /= cosine * cosine;
+        Colour<Channels> sum;
+        if (!answers(theta_r, phi)) return sum;
+        const ScatteredDensities s = scattered_densities(theta_r, phi);
+        const Four unscattered =
+            joint_pdf(longitudinal.gaussian, fibre->azimuthal_gaussian, four_at(centre), theta_r, phi);
+        const float R = lane(unscattered, 0), TT = lane(unscattered, 1), TRT = lane(unscattered, 2);
+        const float TTs = s.M * s.D[0], TRTs = s.M * s.D[1];
+        for (int c = 0; c < Channels; ++c)
+            sum.value[c] = longitudinal.scale * ((R * energy.A[0][c] + TT * energy.A[1][c]) +
+                                                 (TRT * energy.A[2][c] + TTs * energy.A[3][c]) + TRTs * energy.A[4][c]);
         return sum;
+    }
+
+  private:
+    MEDULLA_HOT bool answers(float theta_r, float phi) const noexcept {
+        return valid && detail::within(theta_r, float(pi / 2)) && detail::within(phi, 1e4f);
+    }
+    MEDULLA_HOT ScatteredDensities scattered_densities(float theta_r, float phi) const noexcept {
+        ScatteredDensities at;
+        if (!scattered) return at;
+        const float inclined = longitudinal.theta_i < 0 ? -theta_r : theta_r;
+        const float y[2] = {side * (phi - centre[3]), side * (phi - centre[4])};
+        if (fibre->tables == nullptr) {
+            at.M = blend_sides(contracted_sides(*fibre, longitudinal, inclined),
+                               std::abs(wrap_angle(phi)) * float(1 / pi));
+            for (int p = 0; p < 2; ++p) at.D[p] = lobe(fibre->azimuthal, azimuthal, y[p]);
+            return at;
+        }
+        const UnfoldedTables& tables = *fibre->tables;
+        const float around = tables.azimuth_scale();
+        // Lane 3, half turns from phi = 0, is how far forward the exit is.
+        const ExitPlaces places =
+            exit_places(turns_of(Four(y[0], y[1], inclined, phi)), Four(around, around, tables.longitude_scale(), 2));
+        for (int p = 0; p < 2; ++p) at.D[p] = tables.azimuthal_density(point, tables.azimuth_exit(places, p));
+        at.M = blend_sides(tables.longitudinal_density(longitudinal.point, tables.longitude_exit(places, 2)),
+                           places.place[3]);
+        return at;
     }
 };
 
@@ -406,7 +463,7 @@ MEDULLA_FN void offset_at(NearField<Channels>& near, float h) noexcept {
     const float offset = std::abs(path.h_inside) / p.kappa;
     near.offset = offset < 1 ? offset : 1.0f;
     if (fibre.tables != nullptr) {
-        near.point = fibre.tables->azimuthal_at(fibre.tables->sigma_at(m.sigma), near.offset);
+        near.point = fibre.tables->azimuthal_at(m.sigma_point, near.offset);
         return;
     }
     const float* weight = weights_at(fibre.azimuthal, m.absorbed, near.azimuthal.weight);
@@ -414,15 +471,21 @@ MEDULLA_FN void offset_at(NearField<Channels>& near, float h) noexcept {
              near.azimuthal);
 }
 
+/// Sets `near`, whose fibre and longitudinal part are set, to an offset. @param h [fibre radii], in [-1, 1]; outside it
+/// every lobe is 0
+template <int Channels>
+MEDULLA_FN void set_offset(NearField<Channels>& near, float h) noexcept {
+    near.valid = near.scattered = false;
+    if (near.longitudinal.valid && detail::within(h, 1.0f)) offset_at(near, h);
+}
+
 /// @param h offset [fibre radii], in [-1, 1]; outside it every lobe is 0
 template <int Channels>
 MEDULLA_FN void near_field(const FurFibre<Channels>& fibre, float theta_i, float h,
                            NearField<Channels>& near) noexcept {
     near.fibre = &fibre;
-    near.valid = near.scattered = false;
     longitudinal_at(fibre, theta_i, near.longitudinal);
-    if (!near.longitudinal.valid || !detail::within(h, 1.0f)) return;
-    offset_at(near, h);
+    set_offset(near, h);
 }
 
 /// M and N of every lobe for one offset (the plain way in; keep a NearField where many exits are asked).

@@ -53,13 +53,16 @@ MEDULLA_FN T normal_half_mass(T z) noexcept {
     using std::erf;
     return T(0.5) * erf(z * T(0.70710678118654752));
 }
-/// Abramowitz and Stegun 7.1.26: absolute error 1e-7, and the masses it is used for are not small.
-MEDULLA_FN float normal_half_mass(float z) noexcept {
-    const float x = z * 0.70710678f, t = 1 / (1 + 0.3275911f * x);
-    const float p =
-        t * (0.254829592f + t * (-0.284496736f + t * (1.421413741f + t * (-1.453152027f + t * 1.061405429f))));
-    return 0.5f - 0.5f * p * real_math::exponential(-x * x);
+/// Abramowitz and Stegun 7.1.26: absolute error 1e-7, and the masses it is used for are not small. For float or Four.
+template <class V>
+MEDULLA_FN V normal_half_mass_series(V z) noexcept {
+    const V x = z * V(0.70710678f), t = V(1.0f) / (V(1.0f) + V(0.3275911f) * x);
+    const V p = t * (V(0.254829592f) +
+                     t * (V(-0.284496736f) + t * (V(1.421413741f) + t * (V(-1.453152027f) + t * V(1.061405429f)))));
+    return V(0.5f) - V(0.5f) * p * real_math::exponential(-x * x);
 }
+MEDULLA_FN float normal_half_mass(float z) noexcept { return normal_half_mass_series(z); }
+MEDULLA_FN Four normal_half_mass(Four z) noexcept { return normal_half_mass_series(z); }
 
 /// Mass of the standard normal over [a, b], a <= 0 <= b.
 template <class T>
@@ -83,8 +86,13 @@ struct TruncatedGaussian {
     /// Density at several inclinations abreast.
     template <class V>
     MEDULLA_FN V pdf_of(V theta) const noexcept {
+        return V(peak) * real_math::exponential(exponent_of(theta));
+    }
+    /// log(density / peak)
+    template <class V>
+    MEDULLA_FN V exponent_of(V theta) const noexcept {
         const V d = magnitude(theta - V(origin)) * V(inverse);
-        return V(peak) * real_math::exponential(V(T(-0.5)) * d * (d + V(T(2) * beyond)));
+        return V(T(-0.5)) * d * (d + V(T(2) * beyond));
     }
 };
 
@@ -169,12 +177,20 @@ struct WrappedGaussian {
         const V x = delta - V(T(2 * pi)) * nearest_integer(delta * V(T(1 / (2 * pi))));
         return deviation <= T(1.2) ? images(x) : harmonics(x);
     }
+    /// Whether only one image counts: the next is at least 12 deviations away.
+    MEDULLA_FN bool narrow() const noexcept { return deviation <= T(0.25); }
+    /// log(density / peak) of a narrow one.
+    template <class V>
+    MEDULLA_FN V exponent_of(V delta) const noexcept {
+        const V z = (delta - V(T(2 * pi)) * nearest_integer(delta * V(T(1 / (2 * pi))))) * V(inverse);
+        return V(T(-0.5)) * z * z;
+    }
     /// Sum of images: at deviation 1.2 the first one left out is 7.8 deviations away (1e-13).
     template <class V>
     MEDULLA_FN V images(V x) const noexcept {
         const V z = x * V(inverse);
         V sum = real_math::exponential(V(T(-0.5)) * z * z);
-        if (deviation > T(0.25)) {  // else the next image is at least 12 deviations away
+        if (!narrow()) {
             const V turn = V(T(2 * pi) * inverse), p = z + turn, q = z - turn;
             sum = sum + real_math::exponential(V(T(-0.5)) * p * p) + real_math::exponential(V(T(-0.5)) * q * q);
         }
@@ -207,33 +223,88 @@ MEDULLA_FN WrappedGaussian<T> wrapped_gaussian(T deviation) noexcept {
 
 /// Draws an angle from the centre of the wrapped Gaussian (Box and Muller 1958), in [-pi, pi].
 /// @param u uniform in [0, 1)  @param v uniform in [0, 1)
+/// @param most deviations: beyond it, the second number of the pair, which is independent of the first, stands in
 template <class T>
-MEDULLA_FN T sample(const WrappedGaussian<T>& gaussian, T u, T v) noexcept {
+MEDULLA_FN T sample(const WrappedGaussian<T>& gaussian, T u, T v, T most = T(1e30)) noexcept {
     const T radius = std::sqrt(T(-2) * std::log(T(1) - u));  // 1 - u > 0
-    return wrap_angle(gaussian.deviation * radius * std::cos(T(2 * pi) * v));
+    const T z = radius * std::cos(T(2 * pi) * v);
+    return wrap_angle(gaussian.deviation * (magnitude(z) <= most ? z : radius * std::sin(T(2 * pi) * v)));
 }
 
-/// Densities of three lobes at once, as their pdf(theta); lane 3 is 0.
-MEDULLA_FN Four pdf_of_three(const TruncatedGaussian<float> (&g)[3], float theta) noexcept {
-    const Four d = magnitude(Four(theta) - Four(g[0].origin, g[1].origin, g[2].origin, 0)) *
-                   Four(g[0].inverse, g[1].inverse, g[2].inverse, 0);
-    const Four beyond = Four(g[0].beyond, g[1].beyond, g[2].beyond, 0);
-    return Four(g[0].peak, g[1].peak, g[2].peak, 0) * real_math::exponential(Four(-0.5f) * d * (d + beyond + beyond));
-}
+/// The truncated Gaussians of R, TT and TRT abreast; lane 3 is nobody's.
+struct TruncatedGaussians {
+    Four origin, deviation, inverse, beyond, peak;  ///< as TruncatedGaussian has them
 
-/// Densities of three lobes at once, as their pdf(phi - centre), deviations ascending; lane 3 is 0.
-MEDULLA_FN Four pdf_of_three(const WrappedGaussian<float> (&g)[3], const float* centre, float phi) noexcept {
-    const Four delta = Four(phi) - Four(centre[0], centre[1], centre[2], phi);
-    if (g[2].deviation > 1.2f)
-        return Four(g[0].pdf(lane(delta, 0)), g[1].pdf(lane(delta, 1)), g[2].pdf(lane(delta, 2)), 0);
-    const Four x = delta - Four(float(2 * pi)) * nearest_integer(delta * Four(float(1 / (2 * pi))));
-    const Four inverse = Four(g[0].inverse, g[1].inverse, g[2].inverse, 0), z = x * inverse;
-    Four sum = real_math::exponential(Four(-0.5f) * z * z);
-    if (g[2].deviation > 0.25f) {  // as in images(): below that the other images are 0 to float
-        const Four turn = Four(float(2 * pi)) * inverse, p = z + turn, q = z - turn;
-        sum = sum + real_math::exponential(Four(-0.5f) * p * p) + real_math::exponential(Four(-0.5f) * q * q);
+    MEDULLA_FN TruncatedGaussian<float> operator[](int p) const noexcept {
+        return {lane(origin, p), lane(deviation, p), lane(inverse, p), lane(beyond, p), lane(peak, p)};
     }
-    return Four(g[0].peak, g[1].peak, g[2].peak, 0) * sum;
+    MEDULLA_HOT Four pdf(float theta) const noexcept { return peak * real_math::exponential(exponent(theta)); }
+    MEDULLA_HOT Four exponent(float theta) const noexcept {
+        const Four d = magnitude(Four(theta) - origin) * inverse;
+        return Four(-0.5f) * d * (d + beyond + beyond);
+    }
+};
+
+/// As truncated_gaussian(centre, deviation), lane by lane.
+MEDULLA_FN TruncatedGaussians truncated_gaussians(Four centre, Four deviation) noexcept {
+    const Four edge(float(pi / 2)), zero(0.0f);
+    const Four inverse = Four(1.0f) / deviation, a = (-edge - centre) * inverse, b = (edge - centre) * inverse;
+    const Four mass = detail::normal_mass(choose(a < zero, a, zero), choose(b > zero, b, zero));
+    TruncatedGaussians g = {centre, deviation, inverse, zero, Four(0.39894228f) * inverse / mass};
+    if (!any(a > zero) && !any(b < zero)) return g;
+    TruncatedGaussian<float> each[4];
+    for (int i = 0; i < 4; ++i) each[i] = truncated_gaussian(lane(centre, i), lane(deviation, i));
+    g.origin = Four(each[0].origin, each[1].origin, each[2].origin, each[3].origin);
+    g.beyond = Four(each[0].beyond, each[1].beyond, each[2].beyond, each[3].beyond);
+    g.peak = Four(each[0].peak, each[1].peak, each[2].peak, each[3].peak);
+    return g;
+}
+
+/// The wrapped Gaussians of R, TT and TRT, deviations ascending, one by one or abreast.
+struct WrappedGaussians {
+    WrappedGaussian<float> each[3];
+    Four inverse, peak;  ///< lane 3 is 0
+
+    MEDULLA_FN const WrappedGaussian<float>& operator[](int p) const noexcept { return each[p]; }
+    /// Whether every one is narrow.
+    MEDULLA_HOT bool narrow() const noexcept { return each[2].narrow(); }
+    /// each[p].pdf(phi - centre[p]); lane 3 is 0. @param centre four finite numbers
+    MEDULLA_HOT Four pdf(Four centre, float phi) const noexcept {
+        if (narrow()) return peak * real_math::exponential(exponent(centre, phi));
+        const Four delta = Four(phi) - centre;
+        if (each[2].deviation > 1.2f)
+            return Four(each[0].pdf(lane(delta, 0)), each[1].pdf(lane(delta, 1)), each[2].pdf(lane(delta, 2)), 0);
+        const Four x = delta - Four(float(2 * pi)) * nearest_integer(delta * Four(float(1 / (2 * pi))));
+        const Four turn = Four(float(2 * pi)) * inverse, z = x * inverse, p = z + turn, q = z - turn;
+        return peak * (real_math::exponential(Four(-0.5f) * z * z) + real_math::exponential(Four(-0.5f) * p * p) +
+                       real_math::exponential(Four(-0.5f) * q * q));
+    }
+    MEDULLA_HOT Four exponent(Four centre, float phi) const noexcept {
+        const Four delta = Four(phi) - centre;
+        const Four z = (delta - Four(float(2 * pi)) * nearest_integer(delta * Four(float(1 / (2 * pi))))) * inverse;
+        return Four(-0.5f) * z * z;
+    }
+};
+
+/// M D of R, TT and TRT at an exit; lane 3 is 0. One exponential does for both where D is one image.
+MEDULLA_HOT Four joint_pdf(const TruncatedGaussians& M, const WrappedGaussians& D, Four centre, float theta,
+                           float phi) noexcept {
+    if (!D.narrow()) return M.pdf(theta) * D.pdf(centre, phi);
+    return M.peak * D.peak * real_math::exponential(M.exponent(theta) + D.exponent(centre, phi));
+}
+/// The same of one lobe at several exits. @param delta phi - centre
+template <class V>
+MEDULLA_HOT V joint_pdf(const TruncatedGaussian<float>& M, const WrappedGaussian<float>& D, V theta, V delta) noexcept {
+    if (!D.narrow()) return M.pdf_of(theta) * D.pdf_of(delta);
+    return V(M.peak * D.peak) * real_math::exponential(M.exponent_of(theta) + D.exponent_of(delta));
+}
+
+MEDULLA_FN WrappedGaussians wrapped_gaussians(float a, float b, float c) noexcept {
+    WrappedGaussians g;
+    g.each[0] = wrapped_gaussian(a), g.each[1] = wrapped_gaussian(b), g.each[2] = wrapped_gaussian(c);
+    g.inverse = Four(g.each[0].inverse, g.each[1].inverse, g.each[2].inverse, 0);
+    g.peak = Four(g.each[0].peak, g.each[1].peak, g.each[2].peak, 0);
+    return g;
 }
 
 }  // namespace medulla

@@ -39,22 +39,44 @@ MEDULLA_FN float dip(const AxisView<float>& axis, std::uint32_t span, const floa
     return sum > 0 ? sum * width : 0;
 }
 
+/// Calls put(k, positive, negative) with the coefficients of the contracted lobe for y >= 0 and y < 0.
+template <class Put>
+MEDULLA_FN void exit_coefficients(const TableView& view, const float* weight, Put&& put) noexcept {
+    const std::uint32_t k = view.parameter_axes(), even = view.even_stride(), all = view.layout.rank_stride;
+    for (std::uint32_t row = 0; row < view.layout.axes[k].spans + 3; ++row) {
+        const float e = row_sum(view, k, row, weight, 0, even), o = row_sum(view, k, row, weight, even, all);
+        put(row, e + o, e - o);
+    }
+}
+
+/// Integral over both halves of the axis of what lies below 0. @param at at(j, k): coefficient j for y >= 0 (k = 0) and
+/// y < 0 (k = 1)
+template <class At>
+MEDULLA_FN float dips(const AxisView<float>& axis, At&& at) noexcept {
+    float sum = 0;
+    for (std::uint32_t span = 0; span < axis.spans; ++span)
+        for (std::uint32_t k = 0; k < 2; ++k) {
+            const float c[4] = {at(span, k), at(span + 1, k), at(span + 2, k), at(span + 3, k)};
+            sum += dip(axis, span, c);
+        }
+    return sum;
+}
+
 }  // namespace detail
 
 /// Integral of lobe() over the exit direction, to float precision but for dips narrower than an eighth of a span. Reads
 /// the whole exit factor, as distribute() does: for what must balance energy exactly, not for each lookup.
 MEDULLA_FN float held_integral(const TableView& table, const Contraction& contraction) noexcept {
-    const std::uint32_t k = table.parameter_axes(), middle = table.even_stride(), end = table.layout.rank_stride;
-    const AxisView<float> axis = table.axis(k);
-    float right[4] = {}, left[4] = {}, sum = 0;  // coefficients of the span that ends with row j
-    for (std::uint32_t j = 0; j < axis.spans + 3; ++j) {
-        for (int i = 0; i < 3; ++i) right[i] = right[i + 1], left[i] = left[i + 1];
-        const float even = detail::row_sum(table, k, j, contraction.weight, 0, middle),
-                    odd = detail::row_sum(table, k, j, contraction.weight, middle, end);
-        right[3] = even + odd, left[3] = even - odd;
-        if (j < 3) continue;
-        sum += detail::dip(axis, j - 3, right) + detail::dip(axis, j - 3, left);
-    }
+    const AxisView<float> axis = table.axis(table.parameter_axes());
+    float last[4][2] = {}, sum = 0;  // coefficients of the span that ends with row j
+    detail::exit_coefficients(table, contraction.weight, [&](std::uint32_t j, float positive, float negative) {
+        for (int i = 0; i < 3; ++i) last[i][0] = last[i + 1][0], last[i][1] = last[i + 1][1];
+        last[3][0] = positive, last[3][1] = negative;
+        for (int k = 0; j >= 3 && k < 2; ++k) {
+            const float c[4] = {last[0][k], last[1][k], last[2][k], last[3][k]};
+            sum += detail::dip(axis, j - 3, c);
+        }
+    });
     return 1 + sum * contraction.inverse_integral;
 }
 

@@ -41,6 +41,10 @@ inline FourMask operator>(Four a, Four b) noexcept { return {_mm_cmpgt_ps(a.v, b
 inline Four choose(FourMask mask, Four yes, Four no) noexcept {
     return Four(_mm_or_ps(_mm_and_ps(mask.v, yes.v), _mm_andnot_ps(mask.v, no.v)));
 }
+/// The greater; b for a NaN in a.
+inline Four greater(Four a, Four b) noexcept { return Four(_mm_max_ps(a.v, b.v)); }
+/// 0 where the mask is set.
+inline Four zero_where(FourMask mask, Four a) noexcept { return Four(_mm_andnot_ps(mask.v, a.v)); }
 inline Four square_root(Four a) noexcept { return Four(_mm_sqrt_ps(a.v)); }
 inline Four magnitude(Four a) noexcept { return Four(_mm_andnot_ps(_mm_set1_ps(-0.0f), a.v)); }
 /// |x| with the sign of y.
@@ -54,8 +58,17 @@ inline Four power_of_two(Four k) noexcept {
     const __m128i n = _mm_cvtps_epi32(k.v);
     return Four(_mm_castsi128_ps(_mm_slli_epi32(_mm_add_epi32(n, _mm_set1_epi32(127)), 23)));
 }
+inline bool any(FourMask mask) noexcept { return _mm_movemask_ps(mask.v) != 0; }
 inline Four four_at(const float* x) noexcept { return Four(_mm_loadu_ps(x)); }
+/// @param x aligned to 16 bytes
+inline Four aligned_four_at(const float* x) noexcept { return Four(_mm_load_ps(x)); }
 inline void store_four(Four a, float* x) noexcept { _mm_storeu_ps(x, a.v); }
+/// Whole parts of numbers below 2^31.
+inline void store_whole(Four a, std::int32_t* n) noexcept {
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(n), _mm_cvttps_epi32(a.v));
+}
+/// Bit i: whether lane i is below 0.
+inline unsigned below_zero(Four a) noexcept { return unsigned(_mm_movemask_ps(a.v)); }
 /// Lane i in every lane.
 template <int i>
 inline Four spread(Four a) noexcept {
@@ -64,6 +77,8 @@ inline Four spread(Four a) noexcept {
 /// Lanes 0 0 1 1 and 2 2 3 3.
 inline Four lower_twice(Four a) noexcept { return Four(_mm_unpacklo_ps(a.v, a.v)); }
 inline Four upper_twice(Four a) noexcept { return Four(_mm_unpackhi_ps(a.v, a.v)); }
+/// Rows become columns.
+inline void transpose(Four& a, Four& b, Four& c, Four& d) noexcept { _MM_TRANSPOSE4_PS(a.v, b.v, c.v, d.v); }
 inline float lane(Four a, int i) noexcept {
     alignas(16) float x[4];
     _mm_store_ps(x, a.v);
@@ -110,6 +125,10 @@ MEDULLA_FN FourMask operator>(Four a, Four b) noexcept { return b < a; }
 MEDULLA_FN Four choose(FourMask mask, Four yes, Four no) noexcept {
     return each([&](int i) { return mask.v[i] ? yes.v[i] : no.v[i]; });
 }
+/// The greater; b for a NaN in a.
+MEDULLA_FN Four greater(Four a, Four b) noexcept { return choose(a > b, a, b); }
+/// 0 where the mask is set.
+MEDULLA_FN Four zero_where(FourMask mask, Four a) noexcept { return choose(mask, Four(0.0f), a); }
 MEDULLA_FN Four square_root(Four a) noexcept {
     return each([&](int i) { return std::sqrt(a.v[i]); });
 }
@@ -125,9 +144,19 @@ MEDULLA_FN Four nearest_integer(Four a) noexcept {
 MEDULLA_FN Four power_of_two(Four k) noexcept {
     return each([&](int i) { return std::ldexp(1.0f, int(k.v[i])); });
 }
+MEDULLA_FN bool any(FourMask mask) noexcept { return mask.v[0] || mask.v[1] || mask.v[2] || mask.v[3]; }
 MEDULLA_FN Four four_at(const float* x) noexcept { return Four(x[0], x[1], x[2], x[3]); }
+MEDULLA_FN Four aligned_four_at(const float* x) noexcept { return four_at(x); }
 MEDULLA_FN void store_four(Four a, float* x) noexcept {
     for (int i = 0; i < 4; ++i) x[i] = a.v[i];
+}
+/// Whole parts of numbers below 2^31.
+MEDULLA_FN void store_whole(Four a, std::int32_t* n) noexcept {
+    for (int i = 0; i < 4; ++i) n[i] = std::int32_t(a.v[i]);
+}
+/// Bit i: whether lane i is below 0.
+MEDULLA_FN unsigned below_zero(Four a) noexcept {
+    return unsigned(a.v[0] < 0) | unsigned(a.v[1] < 0) << 1 | unsigned(a.v[2] < 0) << 2 | unsigned(a.v[3] < 0) << 3;
 }
 /// Lane i in every lane.
 template <int i>
@@ -137,6 +166,12 @@ MEDULLA_FN Four spread(Four a) noexcept {
 /// Lanes 0 0 1 1 and 2 2 3 3.
 MEDULLA_FN Four lower_twice(Four a) noexcept { return Four(a.v[0], a.v[0], a.v[1], a.v[1]); }
 MEDULLA_FN Four upper_twice(Four a) noexcept { return Four(a.v[2], a.v[2], a.v[3], a.v[3]); }
+/// Rows become columns.
+MEDULLA_FN void transpose(Four& a, Four& b, Four& c, Four& d) noexcept {
+    const Four x = a, y = b, z = c, w = d;
+    a = Four(x.v[0], y.v[0], z.v[0], w.v[0]), b = Four(x.v[1], y.v[1], z.v[1], w.v[1]);
+    c = Four(x.v[2], y.v[2], z.v[2], w.v[2]), d = Four(x.v[3], y.v[3], z.v[3], w.v[3]);
+}
 MEDULLA_FN float lane(Four a, int i) noexcept { return a.v[i]; }
 MEDULLA_FN float sum_of(Four a) noexcept { return (a.v[0] + a.v[2]) + (a.v[1] + a.v[3]); }
 #endif
@@ -156,6 +191,8 @@ template <class T>
 MEDULLA_FN T choose(bool condition, T yes, T no) noexcept {
     return condition ? yes : no;
 }
+MEDULLA_FN float greater(float a, float b) noexcept { return a > b ? a : b; }
+MEDULLA_FN float zero_where(bool condition, float a) noexcept { return condition ? 0.0f : a; }
 template <class T>
 MEDULLA_FN T square_root(T a) noexcept {
     using std::sqrt;
@@ -173,17 +210,41 @@ MEDULLA_FN T nearest_integer(T a) noexcept {
 MEDULLA_FN float magnitude(float a) noexcept { return a < 0 ? -a : a; }
 MEDULLA_FN float with_sign(float x, float y) noexcept { return y < 0 ? -magnitude(x) : magnitude(x); }
 #if defined(MEDULLA_SSE2)
-inline float nearest_integer(float a) noexcept { return float(_mm_cvtss_si32(_mm_set_ss(a))); }  // no branch on a sign
+// In a vector's lowest lane, since a way through the integer registers takes twice as long.
+inline float nearest_integer(float a) noexcept { return _mm_cvtss_f32(nearest_integer(Four(a)).v); }
+inline float power_of_two(float k) noexcept { return _mm_cvtss_f32(power_of_two(Four(k)).v); }
 #else
 MEDULLA_FN float nearest_integer(float a) noexcept { return float(std::int32_t(a + (a < 0 ? -0.5f : 0.5f))); }
-#endif
 MEDULLA_FN float power_of_two(float k) noexcept {
     const std::int32_t bits = (std::int32_t(k) + 127) * 8388608;  // 2^23
     float x;
     std::memcpy(&x, &bits, sizeof x);
     return x;
 }
+#endif
 MEDULLA_FN float lane(float a, int) noexcept { return a; }
 MEDULLA_FN float sum_of(float a) noexcept { return a; }
+
+#if defined(MEDULLA_SSE2) && defined(__GNUC__) && !defined(__AVX2__) && !defined(__CUDACC__) && !defined(__HIPCC__)
+namespace detail {
+template <class F>
+__attribute__((target("avx2"), flatten)) void run_on_avx2(const F& f) noexcept {
+    f();
+}
+}  // namespace detail
+/// f(), compiled twice: for what the renderer is built for and, taken where the processor has it, for AVX2 with fused
+/// products. For work of microseconds, not for one number.
+template <class F>
+void run_widest(const F& f) noexcept {
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return detail::run_on_avx2(f);
+    f();
+}
+#else
+/// f(), as the renderer is built.
+template <class F>
+MEDULLA_FN void run_widest(const F& f) noexcept {
+    f();
+}
+#endif
 
 }  // namespace medulla

@@ -4,11 +4,12 @@
 // Use.
 //   FurFibre<3> fibre;                              once per material
 //   prepare(parameters, open_pack(default_pack_words, default_pack_size).pack, fibre);
-//   UnfoldedTables tables; unfold(fibre, tables);   optional, 136 KB a material: near field 7 times as fast
+//   UnfoldedTables tables; unfold(fibre, tables);   optional, 142 KB a material: near field 9 times as fast
 //   eval(fibre, theta_i, theta_r, phi, h)           near field: a ray at offset h
 //   eval(fibre, theta_i, theta_r, phi, range)       mean over offsets; OffsetRange{} is the far field
 //   eval(fibre, omega_i, omega_r, h or range)       the same from directions in the fibre's frame
 //   eval(near, count, theta_r, phi, S)              many exits of a NearField at once
+//   eval(fibre, count, theta_i, h, theta_r, phi, S) many queries at once
 //   NearField, FarField; NearSampler, FarSampler    the same, prepared for many exits; sample and pdf
 //
 // Frame. The fibre runs along x, from tip to root; (y, z) is its cross-section. A direction has inclination theta =

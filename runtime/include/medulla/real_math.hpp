@@ -18,27 +18,24 @@ struct SineCosine {
 namespace polynomial {
 
 /// exp(x), x <= 80; below -87 exactly 0, so that a lobe out of reach is no denormal.
-/// x = n log 2 + r, |r| <= log(2) / 2; degree 6 in r.
+/// x = n log 2 + r, |r| <= log(2) / 2; degree 6 in r, by pairs of terms, which wait less for one another.
 template <class T>
 MEDULLA_FN T exponential(T x) noexcept {
-    const auto out = x < T(-87.0f);
-    const T y = choose(out, T(-87.0f), x), k = nearest_integer(y * T(1.44269504f));
-    const T r = (y - k * T(0.693359375f)) + k * T(2.12194440e-4f);
-    const T p =
-        T(1.0f) +
-        r * (T(1.0f) + r * (T(0.5f) + r * (T(1.6666667e-1f) +
-                                           r * (T(4.1666646e-2f) + r * (T(8.3335698e-3f) + r * T(1.3943e-3f))))));
-    return choose(out, T(0.0f), p * power_of_two(k));
+    const T y = greater(x, T(-87.0f)), k = nearest_integer(y * T(1.44269504f));
+    const T r = (y - k * T(0.693359375f)) + k * T(2.12194440e-4f), r2 = r * r;
+    const T p = (T(1.0f) + r) + r2 * ((T(0.5f) + r * T(1.6666667e-1f)) +
+                                      r2 * ((T(4.1666646e-2f) + r * T(8.3335698e-3f)) + r2 * T(1.3943e-3f)));
+    return zero_where(x < T(-87.0f), p * power_of_two(k));
 }
 
-/// 1 - exp(-x), x >= 0: Taylor to x^6 below 0.25, where the next term is 5e-8 of the first.
+/// 1 - exp(-x), x >= 0: Taylor to x^6 below 0.25, where the next term is 5e-8 of the first. @param left exp(-x)
 template <class T>
-MEDULLA_FN T absorbed(T x) noexcept {
+MEDULLA_FN T absorbed(T x, T left) noexcept {
     const T z = choose(x < T(0.25f), x, T(0.0f));
     const T small =
         z * (T(1.0f) - z * (T(0.5f) - z * (T(1.6666667e-1f) -
                                            z * (T(4.1666667e-2f) - z * (T(8.3333333e-3f) - z * T(1.3888889e-3f))))));
-    return choose(x < T(0.25f), small, T(1.0f) - exponential(-x));
+    return choose(x < T(0.25f), small, T(1.0f) - left);
 }
 
 /// Angle in [-pi/2, pi/2] of the point (cosine >= 0, sine) on the unit circle: asin of the smaller of the two, by
@@ -80,14 +77,29 @@ MEDULLA_FN T exponential(T x) noexcept {
 MEDULLA_FN float exponential(float x) noexcept { return polynomial::exponential(x); }
 MEDULLA_FN Four exponential(Four x) noexcept { return polynomial::exponential(x); }
 
-/// 1 - exp(-x) for x >= 0, to full relative precision.
+/// exp(x[i]) in the place of each x[i]; floats four abreast.
+template <int n, class T>
+MEDULLA_FN void exponentials(T (&x)[n]) noexcept {
+    for (int i = 0; i < n; ++i) x[i] = exponential(x[i]);
+}
+template <int n>
+MEDULLA_FN void exponentials(float (&x)[n]) noexcept {
+    for (int i = 0; i < n; i += 4) {
+        const int more = n - i - 1;  // beyond x[i]
+        const Four e =
+            exponential(Four(x[i], x[more > 0 ? i + 1 : i], x[more > 1 ? i + 2 : i], x[more > 2 ? i + 3 : i]));
+        for (int k = 0; k <= more && k < 4; ++k) x[i + k] = lane(e, k);
+    }
+}
+
+/// 1 - exp(-x) for x >= 0, to full relative precision. @param left exp(-x)
 template <class T>
-MEDULLA_FN T absorbed(T x) noexcept {
+MEDULLA_FN T absorbed(T x, T) noexcept {
     using std::expm1;
     return -expm1(-x);
 }
-MEDULLA_FN float absorbed(float x) noexcept { return polynomial::absorbed(x); }
-MEDULLA_FN Four absorbed(Four x) noexcept { return polynomial::absorbed(x); }
+MEDULLA_FN float absorbed(float x, float left) noexcept { return polynomial::absorbed(x, left); }
+MEDULLA_FN Four absorbed(Four x, Four left) noexcept { return polynomial::absorbed(x, left); }
 
 /// The angle in [-pi/2, pi/2] of the point (cosine >= 0, sine) on the unit circle.
 template <class T>
@@ -97,6 +109,16 @@ MEDULLA_FN T angle(T sine, T cosine) noexcept {
 }
 MEDULLA_FN float angle(float sine, float cosine) noexcept { return polynomial::angle(sine, cosine); }
 MEDULLA_FN Four angle(Four sine, Four cosine) noexcept { return polynomial::angle(sine, cosine); }
+
+/// angle(sine[i], cosine[i]); floats abreast.
+template <class T>
+MEDULLA_FN void angles(const T (&sine)[2], const T (&cosine)[2], T (&result)[2]) noexcept {
+    for (int i = 0; i < 2; ++i) result[i] = angle(sine[i], cosine[i]);
+}
+MEDULLA_FN void angles(const float (&sine)[2], const float (&cosine)[2], float (&result)[2]) noexcept {
+    const Four both = angle(Four(sine[0], sine[1], 0, 0), Four(cosine[0], cosine[1], 1, 1));
+    for (int i = 0; i < 2; ++i) result[i] = lane(both, i);
+}
 
 /// Sine and cosine of an angle in [-pi/2, pi/2].
 template <class T>

@@ -298,7 +298,10 @@ MEDULLA_FN FurSample<Channels> FarSampler<Channels>::sample(RandomNumbers u) con
     s.lobe = static_cast<Lobe>(k);
     if (k < 3) {
         const float centre_k = unscattered_centre(k, path.gamma_i, path.gamma_t);
-        s.phi = wrap_angle(centre_k + medulla::sample(fibre.azimuthal_gaussian[k], u.azimuth, u.azimuth2));
+        const WrappedGaussian<float>& D = fibre.azimuthal_gaussian[k];
+        // Held to where the density is integrated, but for the square of what lies outside: 2e-8.
+        const float most = D.deviation > detail::wide_deviation ? 1e30f : detail::reach;
+        s.phi = wrap_angle(centre_k + medulla::sample(D, u.azimuth, u.azimuth2, most));
         s.theta_r = medulla::sample(m.gaussian[k], u.longitude);
     } else {
         if (u.lobe < even_share) {

@@ -6,13 +6,20 @@
 #include <cmath>
 #include <cstdint>
 
+#include "medulla/held_integral.hpp"
 #include "medulla/lanes.hpp"
 #include "medulla/lookup.hpp"
 
 namespace medulla {
 
 /// Spans that there is room for; the default pack fits.
-inline constexpr std::uint32_t most_offset_spans = 24, most_inclination_spans = 56, most_exit_spans = 64;
+inline constexpr std::uint32_t most_offset_spans = 24, most_inclination_spans = 68, most_exit_spans = 64;
+
+/// Angles in turns, less whole ones, in [-1/2, 1/2]. @param y [radians], |y| < 1e9
+MEDULLA_HOT Four turns_of(Four y) noexcept {
+    const Four t = y * Four(float(1 / (2 * pi)));
+    return t - nearest_integer(t);
+}
 
 /// Four neighbouring rows of an axis and their weights.
 struct RowPoint {
@@ -22,11 +29,12 @@ struct RowPoint {
 
 /// Four weights that are cubics in t in [0, 1]: read, not recomputed.
 struct CubicWeights {
-    float power[4][4];  ///< [power of t][row]
+    alignas(16) float power[4][4];  ///< [power of t][row]
 
     MEDULLA_HOT Four at(float t) const noexcept {
         const Four x(t);
-        return (four_at(power[0]) + x * four_at(power[1])) + (x * x) * (four_at(power[2]) + x * four_at(power[3]));
+        return (aligned_four_at(power[0]) + x * aligned_four_at(power[1])) +
+               (x * x) * (aligned_four_at(power[2]) + x * aligned_four_at(power[3]));
     }
 };
 
@@ -57,62 +65,88 @@ MEDULLA_FN SplineWeights<float> lagrange_weights(const float (&x)[4], float at) 
     return w;
 }
 
-/// An axis of a pack with the weights of each of its spans, and an index fine enough that the search takes two steps.
+/// A span of an axis.
+struct CubicSpan {
+    CubicWeights weights;      ///< of its four rows, over the place within it
+    float low, high, inverse;  ///< its ends and 1 / its length [stretches]; the last one's upper end is out of reach
+    std::uint32_t first;       ///< of its four rows
+};
+
+/// An axis of a pack with the weights of each of its spans. Even stretches say which span a value lies in; breakpoints
+/// fall on their ends where that can be had (those of exits do, being whole bins apart), so that none is searched.
 template <std::uint32_t Most>
 struct CubicAxis {
-    static constexpr std::int32_t stretches = 256;
+    static constexpr std::int32_t most_stretches = 720;
     std::uint32_t spans = 0;
-    float lower, upper, scale;           ///< scale = stretches / (upper - lower)
-    std::uint8_t start[stretches];       ///< a span that begins at or before the stretch
-    float low[Most + 2], inverse[Most];  ///< a span's lower end, out of reach after the last; 1 / its length
-    std::uint8_t first[Most];            ///< of its four rows
-    CubicWeights weights[Most];
+    std::int32_t stretches = 0;
+    float lower, upper, scale;               ///< scale = stretches / (upper - lower)
+    std::uint8_t start[most_stretches + 1];  ///< the span at the beginning of the stretch; one more for the upper end
+    alignas(16) CubicSpan span[Most];
 
     /// Rows are the pack's spline coefficients.
     MEDULLA_FN void set_spline(const AxisView<float>& axis) noexcept {
-        set(axis, [&](std::uint32_t span) {
-            first[span] = static_cast<std::uint8_t>(span);
-            const float a = axis.breakpoint(std::int32_t(span)), b = axis.breakpoint(std::int32_t(span + 1));
-            return cubic_weights([&](float t) { return spline_weights(axis, Cell<float>{span, a + t * (b - a)}); });
-        });
+        set(
+            axis.spans, [&](std::uint32_t i) { return axis.breakpoint(std::int32_t(i)); },
+            [&](std::uint32_t i, float a, float b) {
+                span[i].first = i;
+                return cubic_weights([&](float t) { return spline_weights(axis, Cell<float>{i, a + t * (b - a)}); });
+            });
     }
-    /// Rows are values at the breakpoints, joined by the cubic through the four nearest; 3 spans and more.
-    MEDULLA_FN void set_nodes(const AxisView<float>& axis) noexcept {
-        set(axis, [&](std::uint32_t span) {
-            const std::uint32_t before = span > 0 ? span - 1 : 0;
-            const std::uint32_t from = before + 3 <= axis.spans ? before : axis.spans - 3;
-            first[span] = static_cast<std::uint8_t>(from);
-            float x[4];
-            for (std::uint32_t i = 0; i < 4; ++i) x[i] = axis.breakpoint(std::int32_t(from + i));
-            const float a = axis.breakpoint(std::int32_t(span)), b = axis.breakpoint(std::int32_t(span + 1));
-            return cubic_weights([&](float t) { return lagrange_weights(x, a + t * (b - a)); });
-        });
+    /// Rows are values at count + 1 ascending nodes, joined by the cubic through the four nearest; count >= 3.
+    MEDULLA_FN void set_nodes(std::uint32_t count, const float* node) noexcept {
+        set(
+            count, [&](std::uint32_t i) { return node[i]; },
+            [&](std::uint32_t i, float a, float b) {
+                const std::uint32_t before = i > 0 ? i - 1 : 0, from = before + 3 <= count ? before : count - 3;
+                span[i].first = from;
+                const float x[4] = {node[from], node[from + 1], node[from + 2], node[from + 3]};
+                return cubic_weights([&](float t) { return lagrange_weights(x, a + t * (b - a)); });
+            });
     }
     /// @param x a spline coordinate, held to the axis's ends; no NaN
     MEDULLA_HOT RowPoint at(float x) const noexcept {
         x = x > lower ? x : lower, x = x < upper ? x : upper;
-        const auto stretch = std::int32_t((x - lower) * scale);
-        std::uint32_t span = start[stretch < stretches ? stretch : stretches - 1];
-        span += std::uint32_t(low[span + 1] <= x) + std::uint32_t(low[span + 2] <= x);
-        while (low[span + 1] <= x) ++span;  // where breakpoints are denser than stretches
-        return {first[span], weights[span].at((x - low[span]) * inverse[span])};
+        const float u = (x - lower) * scale;
+        const auto stretch = std::int32_t(u);
+        return at(stretch < stretches ? stretch : stretches, u);
+    }
+    /// @param u a place [stretches] on the axis, in stretch `stretch`
+    MEDULLA_HOT RowPoint at(std::int32_t stretch, float u) const noexcept {
+        const CubicSpan* s = span + start[stretch];
+        while (s->high <= u) ++s;  // where a breakpoint lies within the stretch
+        return {s->first, s->weights.at((u - s->low) * s->inverse)};
     }
 
   private:
-    template <class F>
-    MEDULLA_FN void set(const AxisView<float>& axis, F&& weights_of) noexcept {
-        spans = axis.spans, lower = axis.lower(), upper = axis.upper();
+    template <class Breakpoint, class F>
+    MEDULLA_FN void set(std::uint32_t count, Breakpoint&& breakpoint, F&& weights_of) noexcept {
+        spans = count, lower = breakpoint(0), upper = breakpoint(count);
+        // Rounding moves a place by 1e-4 stretches, so within 1e-3 of an end is the end; the cubic of the neighbouring
+        // span is there the same to the third power of that.
+        constexpr float near = 1e-3f;
+        const auto on_ends = [&](std::int32_t n) {
+            for (std::uint32_t i = 1; i < spans; ++i) {
+                const float u = (breakpoint(i) - lower) * float(n) / (upper - lower);
+                if (magnitude(u - nearest_integer(u)) > near) return false;
+            }
+            return true;
+        };
+        stretches = std::int32_t(spans);
+        while (stretches < most_stretches && !on_ends(stretches)) ++stretches;
         scale = float(stretches) / (upper - lower);
-        for (std::uint32_t span = 0; span < spans; ++span) {
-            weights[span] = weights_of(span);
-            low[span] = axis.breakpoint(std::int32_t(span)), inverse[span] = axis.number(std::int32_t(span), 1);
+        for (std::uint32_t i = 0; i < spans; ++i) {
+            const float a = breakpoint(i), b = breakpoint(i + 1);
+            span[i].weights = weights_of(i, a, b);
+            span[i].low = (a - lower) * scale, span[i].high = (b - lower) * scale;
+            span[i].inverse = 1 / (span[i].high - span[i].low);
         }
-        low[spans] = low[spans + 1] = 3.4e38f;
-        std::uint32_t span = 0;
-        for (int i = 0; i < stretches; ++i) {  // a hundredth of a stretch earlier: no rounding reaches that far
-            while (low[span + 1] <= lower + (float(i) - 0.01f) / scale) ++span;
-            start[i] = static_cast<std::uint8_t>(span);
+        std::uint32_t at = 0;
+        for (std::int32_t i = 0; i <= stretches; ++i) {
+            while (at + 1 < spans && span[at].high <= float(i) + near) ++at;
+            start[i] = static_cast<std::uint8_t>(at);
         }
+        for (std::uint32_t i = 0; i + 1 < spans; ++i) span[i].high += near;
+        span[spans - 1].high = 3.4e38f;
     }
 };
 
@@ -134,7 +168,23 @@ struct BackForward {
     float back, forward;
 };
 
-/// The tables of one material, 136 KB in memory that the caller keeps for as long as the fibre that reads them.
+/// Four exits on axes that are symmetric about 0: how far from 0 [stretches], and which lanes lie below it.
+struct ExitPlaces {
+    std::int32_t stretch[4];
+    float place[4];
+    unsigned below;
+};
+
+/// @param turns exits less whole turns, in [-1/2, 1/2]  @param scale stretches per turn
+MEDULLA_HOT ExitPlaces exit_places(Four turns, Four scale) noexcept {
+    ExitPlaces p;
+    const Four u = magnitude(turns) * scale;
+    store_whole(u, p.stretch), store_four(u, p.place);
+    p.below = below_zero(turns);
+    return p;
+}
+
+/// The tables of one material, 142 KB in memory that the caller keeps for as long as the fibre that reads them.
 struct UnfoldedTables {
     float least_root = 0, inverse_range = 0;  ///< sqrt(sigma) runs over [least_root, least_root + 1 / inverse_range]
     CubicWeights sigma_weights;               ///< of four Chebyshev nodes in it
@@ -158,75 +208,77 @@ struct UnfoldedTables {
     MEDULLA_HOT AzimuthalPoint azimuthal_at(Four sigma, float h) const noexcept {
         const RowPoint row = offset.at(spline_coordinate(Quantity::h, h));
         const float* x = integral[row.first];
-        const Four sum = spread<0>(row.weight) * four_at(x) + spread<1>(row.weight) * four_at(x + 4) +
-                         spread<2>(row.weight) * four_at(x + 8) + spread<3>(row.weight) * four_at(x + 12);
+        const Four sum =
+            (spread<0>(row.weight) * aligned_four_at(x) + spread<1>(row.weight) * aligned_four_at(x + 4)) +
+            (spread<2>(row.weight) * aligned_four_at(x + 8) + spread<3>(row.weight) * aligned_four_at(x + 12));
         const float total = sum_of(sum * sigma);
         return {azimuthal + std::size_t(row.first) * 8 * azimuth_rows(), row.weight, sigma,
                 total > 1e-30f && total < 1e30f ? 1 / total : 0.0f};
     }
-    /// Where exit y lies among an azimuthal point's rows. @param y [radians], |y| < 1e9
-    MEDULLA_HOT RowPoint azimuth_exit(float y) const noexcept {
-        const float x = y - float(2 * pi) * nearest_integer(y * float(1 / (2 * pi)));
-        const RowPoint exit = azimuth.at(x < 0 ? -x : x);
-        const std::uint32_t other = 0u - std::uint32_t(x < 0);  // no branch on a sign
-        return {4 * (exit.first + (azimuth_rows() & other)), exit.weight};
+    MEDULLA_HOT float azimuth_scale() const noexcept { return float(2 * azimuth.stretches); }
+    MEDULLA_HOT float longitude_scale() const noexcept { return float(4 * longitude.stretches); }
+
+    /// Where exit i lies among an azimuthal point's rows.
+    MEDULLA_HOT RowPoint azimuth_exit(const ExitPlaces& p, int i) const noexcept {
+        const RowPoint exit = azimuth.at(p.stretch[i], p.place[i]);
+        return {4 * (exit.first + azimuth_rows() * (p.below >> i & 1u)), exit.weight};
+    }
+    /// Where exit i lies among a longitudinal point's rows.
+    MEDULLA_HOT RowPoint longitude_exit(const ExitPlaces& p, int i) const noexcept {
+        const RowPoint exit = longitude.at(p.stretch[i], p.place[i]);
+        return {2 * (exit.first + longitude_rows() * (p.below >> i & 1u)), exit.weight};
     }
     /// Density per radian at an exit, >= 0.
     MEDULLA_HOT float azimuthal_density(const AzimuthalPoint& p, const RowPoint& exit) const noexcept {
-        const std::uint32_t step = 4 * azimuth_rows();
-        const float* row = p.rows + exit.first;
+        const std::uint32_t step = 8 * azimuth_rows();
+        const float *r0 = p.rows + exit.first, *r1 = r0 + step, *r2 = r1 + step, *r3 = r2 + step;
         // h first: its weights are known before the exit's.
-        const auto blend = [&](const float* r) {
-            return (spread<0>(p.offset) * four_at(r) + spread<1>(p.offset) * four_at(r + 2 * step)) +
-                   (spread<2>(p.offset) * four_at(r + 4 * step) + spread<3>(p.offset) * four_at(r + 6 * step));
+        const auto blend = [&](int k) {
+            return (spread<0>(p.offset) * aligned_four_at(r0 + k) + spread<1>(p.offset) * aligned_four_at(r1 + k)) +
+                   (spread<2>(p.offset) * aligned_four_at(r2 + k) + spread<3>(p.offset) * aligned_four_at(r3 + k));
         };
-        const Four sum = (spread<0>(exit.weight) * blend(row) + spread<1>(exit.weight) * blend(row + 4)) +
-                         (spread<2>(exit.weight) * blend(row + 8) + spread<3>(exit.weight) * blend(row + 12));
+        const Four sum = (spread<0>(exit.weight) * blend(0) + spread<1>(exit.weight) * blend(4)) +
+                         (spread<2>(exit.weight) * blend(8) + spread<3>(exit.weight) * blend(12));
         const float value = sum_of(sum * p.sigma) * p.inverse_integral;
-        return value < 0 ? 0.0f : value;
+        return value > 0 ? value : 0.0f;
     }
+    /// @param y [radians], |y| < 1e9
     MEDULLA_HOT float azimuthal_density(const AzimuthalPoint& p, float y) const noexcept {
-        return azimuthal_density(p, azimuth_exit(y));
+        return azimuthal_density(p, azimuth_exit(exit_places(turns_of(Four(y)), Four(azimuth_scale())), 0));
+    }
+    /// At two exits, as TTs and TRTs ask.
+    MEDULLA_HOT void azimuthal_densities(const AzimuthalPoint& p, float y0, float y1, float (&N)[2]) const noexcept {
+        const ExitPlaces at = exit_places(turns_of(Four(y0, y1, y0, y1)), Four(azimuth_scale()));
+        for (int i = 0; i < 2; ++i) N[i] = azimuthal_density(p, azimuth_exit(at, i));
     }
     /// @param theta_i [radians], in [0, pi/2]
     MEDULLA_HOT LongitudinalPoint longitudinal_at(float theta_i) const noexcept {
         const RowPoint row = inclination.at(spline_coordinate(Quantity::theta_i, theta_i));
         return {longitudinal + std::size_t(row.first) * 4 * longitude_rows(), row.weight};
     }
-    /// Where exit y lies among a longitudinal point's rows. @param y [radians], in [-pi/2, pi/2]
-    MEDULLA_HOT RowPoint longitude_exit(float y) const noexcept {
-        const RowPoint exit = longitude.at(y < 0 ? -y : y);
-        const std::uint32_t other = 0u - std::uint32_t(y < 0);
-        return {2 * (exit.first + (longitude_rows() & other)), exit.weight};
-    }
     /// Densities per radian at an exit, >= 0.
     MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, const RowPoint& exit) const noexcept {
-        const std::uint32_t step = 2 * longitude_rows();
-        const float* row = p.rows + exit.first;
-        const auto blend = [&](const float* r) {
-            return (spread<0>(p.weight) * four_at(r) + spread<1>(p.weight) * four_at(r + 2 * step)) +
-                   (spread<2>(p.weight) * four_at(r + 4 * step) + spread<3>(p.weight) * four_at(r + 6 * step));
+        const std::uint32_t step = 4 * longitude_rows();
+        const float *r0 = p.rows + exit.first, *r1 = r0 + step, *r2 = r1 + step, *r3 = r2 + step;
+        const auto blend = [&](int k) {
+            return (spread<0>(p.weight) * four_at(r0 + k) + spread<1>(p.weight) * four_at(r1 + k)) +
+                   (spread<2>(p.weight) * four_at(r2 + k) + spread<3>(p.weight) * four_at(r3 + k));
         };
-        const Four sum = lower_twice(exit.weight) * blend(row) + upper_twice(exit.weight) * blend(row + 4);
-        const float back = lane(sum, 0) + lane(sum, 2), forward = lane(sum, 1) + lane(sum, 3);
-        return {back < 0 ? 0.0f : back, forward < 0 ? 0.0f : forward};
+        const Four sum = lower_twice(exit.weight) * blend(0) + upper_twice(exit.weight) * blend(4);
+        return both_of(sum);
     }
+    /// @param y [radians], in [-pi/2, pi/2]
     MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, float y) const noexcept {
-        return longitudinal_density(p, longitude_exit(y));
+        return longitudinal_density(p, longitude_exit(exit_places(turns_of(Four(y)), Four(longitude_scale())), 0));
+    }
+    /// Lanes 0 + 2 and 1 + 3, >= 0.
+    static MEDULLA_HOT BackForward both_of(Four sum) noexcept {
+        const float back = lane(sum, 0) + lane(sum, 2), forward = lane(sum, 1) + lane(sum, 3);
+        return {back > 0 ? back : 0.0f, forward > 0 ? forward : 0.0f};
     }
 };
 
 namespace detail {
-
-/// Calls put(k, positive, negative) with the coefficients of the contracted lobe for y >= 0 and y < 0.
-template <class Put>
-MEDULLA_FN void exit_coefficients(const TableView& view, const float* weight, Put&& put) noexcept {
-    const std::uint32_t k = view.parameter_axes(), even = view.even_stride(), all = view.layout.rank_stride;
-    for (std::uint32_t row = 0; row < view.layout.axes[k].spans + 3; ++row) {
-        const float e = row_sum(view, k, row, weight, 0, even), o = row_sum(view, k, row, weight, even, all);
-        put(row, e + o, e - o);
-    }
-}
 
 /// integral over y of the contracted lobe.
 MEDULLA_FN float exit_integral(const TableView& view, const float* weight) noexcept {

@@ -190,13 +190,16 @@ class Programs(unittest.TestCase):
     def test_time_budget_betters_what_is_coarse(self):
         words = SMALL[:-4] + ["--progress", "none", "--json"]
         worst = []
-        for seconds in ("1e-9", "1.5"):
+        # How much is enough depends on the machine: a busy one under a sanitizer needs many times what a quiet one does.
+        for seconds in ("1e-9", "1.5", "15", "150"):
             status, out, err = run("medulla-precompute", "-o", self.path(f"b{seconds}.h5"), *words, "--time-budget",
                                    seconds)
             self.assertEqual(status, 0, err)
             worst.append(max(t["worst_standard_error"] for t in json.loads(out)["tables"].values()))
             self.assertEqual(run("furtable", "verify", self.path(f"b{seconds}.h5"))[0], 0)
-        self.assertLess(worst[1], worst[0])
+            if worst[-1] < worst[0]:
+                break
+        self.assertLess(worst[-1], worst[0])
 
     def test_scene_is_a_part_of_the_whole(self):
         scene = self.path("scene.json")

@@ -10,7 +10,7 @@
 using namespace medulla;
 using namespace medulla::tables;
 
-TEST_CASE("locate and position are each other's inverse; ends are held", "[axis]") {
+TEST_CASE("locate and position are each other's inverse, and ends are held", "[axis]") {
     const Spline open({0, 0.1, 0.5, 2, 3.5});
     for (double x = 0; x <= 3.5; x += 0.01) {
         const Cell<double> cell = locate(open.view(), x);

@@ -173,7 +173,7 @@ TEST_CASE("ALS: the error never rises and the report tells the truth", "[cp][als
     }
 }
 
-TEST_CASE("same bytes for 1, 2 and 5 threads; other seeds, other starts", "[cp][als]") {
+TEST_CASE("same bytes for 1, 2 and 5 threads, other seeds are other starts", "[cp][als]") {
     Tensor x = expand(random_model({20, 9, 10, 110}, 6, 8));
     CpOptions options;
     options.rank = 4;

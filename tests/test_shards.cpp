@@ -180,7 +180,7 @@ TEST_CASE("Which shard a process is: the words, Slurm's and Open MPI's environme
     CHECK_THROWS_AS(shard({{"OMPI_COMM_WORLD_RANK", "x"}, {"OMPI_COMM_WORLD_SIZE", "2"}}), Error);
 }
 
-TEST_CASE("A shard gives back what was written; any flipped byte, cut or swap is damage", "[shards]") {
+TEST_CASE("A shard gives back what was written, and any flipped byte, cut or swap is damage", "[shards]") {
     const Folder folder;
     const SliceSolver solver(small_request());
     ShardFolder shards(folder / "t.h5.shards", solver.plan());
@@ -228,7 +228,7 @@ TEST_CASE("A shard gives back what was written; any flipped byte, cut or swap is
     CHECK(contains(complaint([&] { second.open(false); }), "at work"));
 }
 
-TEST_CASE("A job leaves its file alone; a stopped one goes on from its shards", "[shards]") {
+TEST_CASE("A job leaves its file alone, and a stopped one goes on from its shards", "[shards]") {
     const Folder folder;
     const Request request = small_request();
     const std::string output = folder / "t.h5", shards = output + ".shards";

@@ -49,7 +49,7 @@ void check_same(const Table& a, const Table& b) {
 
 }  // namespace
 
-TEST_CASE("Same seed, same values for 1, 2 and 5 threads; another seed, others", "[tables]") {
+TEST_CASE("Same seed, same values for 1, 2 and 5 threads, others for another seed", "[tables]") {
     for (const Method method : {Method::mc, Method::automatic}) {
         Request request = small_request(method);
         request.threads = 1;

@@ -184,7 +184,7 @@ MEDULLA_HOT ExitPlaces exit_places(Four turns, Four scale) noexcept {
     return p;
 }
 
-/// The tables of one material, 142 KB in memory that the caller keeps for as long as the fibre that reads them.
+/// The tables of one material, 149 KB in memory that the caller keeps for as long as the fibre that reads them.
 struct UnfoldedTables {
     float least_root = 0, inverse_range = 0;  ///< sqrt(sigma) runs over [least_root, least_root + 1 / inverse_range]
     CubicWeights sigma_weights;               ///< of four Chebyshev nodes in it

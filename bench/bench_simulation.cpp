@@ -154,7 +154,7 @@ bench::Panel measure_tables(double reference, std::size_t cells, json& out) {
             const double most = *std::max_element(e.actual.begin(), e.actual.end());
             const auto above = std::count_if(e.actual.begin(), e.actual.end(), [&](double x) { return x > target; });
             std::printf(
-                "  true error of %zu lobes against target %.0e: median %.1e, worst %.1e, %td above the target; "
+                "  true error of %zu lobes against target %.1e: median %.1e, worst %.1e, %td above the target; "
                 "estimated / true: median %.1f, least %.2f\n",
                 e.actual.size(), reference, median(e.actual), most, above, median(ratio),
                 *std::min_element(ratio.begin(), ratio.end()));

@@ -192,11 +192,15 @@ bool coarsen_exits(const Tables& tables, const ExitSpans& spans, std::vector<Par
         if (!is_lobe(kind)) continue;
         double expected = 0;
         for (std::size_t i = first; i < last; ++i) expected = std::hypot(expected, pilots[i].expected(shared[i].rank));
+        const auto too_coarse = [expected](auto from, auto to) {
+            double exit = 0;
+            for (; from != to; ++from) exit = std::hypot(exit, from->exit_error);
+            return exit > expected / 3;
+        };
+        if (too_coarse(&parts[first], &parts[first] + (last - first))) continue;
         for (std::size_t eighths = 7; eighths >= 4; --eighths) {
             std::vector<Part> coarse = lobe_parts_of(tables, kind, spans[kind] * eighths / 8);
-            double exit = 0;
-            for (const Part& part : coarse) exit = std::hypot(exit, part.exit_error);
-            if (exit > expected / 3 || coarse.size() != last - first) break;
+            if (too_coarse(coarse.begin(), coarse.end()) || coarse.size() != last - first) break;
             std::move(coarse.begin(), coarse.end(), parts.begin() + static_cast<std::ptrdiff_t>(first));
             for (std::size_t i = first; i < last; ++i) pilots[i].result = {};
             changed = true;

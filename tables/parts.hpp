@@ -42,12 +42,11 @@ std::vector<double> exit_breakpoints(TableKind kind, std::size_t bins, std::size
 struct ExitSpans {
     std::size_t azimuthal = 96, longitudinal_back = 128, longitudinal_forward = 128;
 
-    std::size_t& operator[](TableKind kind) {
+    std::size_t operator[](TableKind kind) const {
         return kind == TableKind::azimuthal           ? azimuthal
                : kind == TableKind::longitudinal_back ? longitudinal_back
                                                       : longitudinal_forward;
     }
-    std::size_t operator[](TableKind kind) const { return const_cast<ExitSpans&>(*this)[kind]; }
 };
 
 /// The parts of one kind of lobe: even before odd. A part that is nothing but float rounding of its lobes is left out.

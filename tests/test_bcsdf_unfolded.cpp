@@ -4,6 +4,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <random>
 
@@ -60,6 +61,25 @@ TEST_CASE("unfolded tables say what the factors say, near and far", "[bcsdf]") {
         // A twentieth of the pack's own error (2e-3, docs/accuracy.md), of which it then makes 0.13 % more.
         for (int i = 0; i < 3; ++i) CHECK(std::sqrt(error[i] / norm[i]) < 1e-4);
     }
+}
+
+TEST_CASE("holding an unfolded lobe at 0 hides no NaN", "[bcsdf]") {
+    const auto tables = std::make_unique<UnfoldedTables>();
+    FurFibre<3> fibre;
+    REQUIRE(prepare(parameters_of<3>(*find_preset("cat")), default_view(), fibre) == FurStatus::ok);
+    REQUIRE(unfold(fibre, *tables));
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    NearField<3> near;
+    near_field(fibre, 0.3f, 0.4f, near);
+    AzimuthalPoint azimuthal = near.point;
+    CHECK(tables->azimuthal_density(azimuthal, 0.5f) > 0);
+    azimuthal.inverse_integral = nan;
+    CHECK(std::isnan(tables->azimuthal_density(azimuthal, 0.5f)));
+    LongitudinalPoint longitudinal = tables->longitudinal_at(0.3f);
+    CHECK(tables->longitudinal_density(longitudinal, 0.2f).back > 0);
+    longitudinal.weight = Four(nan);
+    CHECK(std::isnan(tables->longitudinal_density(longitudinal, 0.2f).back));
+    CHECK(std::isnan(tables->longitudinal_density(longitudinal, 0.2f).forward));
 }
 
 TEST_CASE("unfolded lobes integrate to their energies, to the ends of every range", "[bcsdf]") {

@@ -240,7 +240,7 @@ struct UnfoldedTables {
         const Four sum = (spread<0>(exit.weight) * blend(0) + spread<1>(exit.weight) * blend(4)) +
                          (spread<2>(exit.weight) * blend(8) + spread<3>(exit.weight) * blend(12));
         const float value = sum_of(sum * p.sigma) * p.inverse_integral;
-        return value > 0 ? value : 0.0f;
+        return 0.0f > value ? 0.0f : value;  // a NaN stays one
     }
     /// @param y [radians], |y| < 1e9
     MEDULLA_HOT float azimuthal_density(const AzimuthalPoint& p, float y) const noexcept {
@@ -271,10 +271,10 @@ struct UnfoldedTables {
     MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, float y) const noexcept {
         return longitudinal_density(p, longitude_exit(exit_places(turns_of(Four(y)), Four(longitude_scale())), 0));
     }
-    /// Lanes 0 + 2 and 1 + 3, >= 0.
+    /// Lanes 0 + 2 and 1 + 3, >= 0; a NaN stays one.
     static MEDULLA_HOT BackForward both_of(Four sum) noexcept {
         const float back = lane(sum, 0) + lane(sum, 2), forward = lane(sum, 1) + lane(sum, 3);
-        return {back > 0 ? back : 0.0f, forward > 0 ? forward : 0.0f};
+        return {0.0f > back ? 0.0f : back, 0.0f > forward ? 0.0f : forward};
     }
 };
 

@@ -11,7 +11,7 @@
 
 namespace medulla::sim2d {
 
-SlabDoubling slab_doubling(double sigma, double g, std::size_t directions) {
+SlabDoubling slab_doubling(double sigma, double g, std::size_t directions, double absorption) {
     using Eigen::Index;
     using Eigen::MatrixXd;
     constexpr double half_pi = 1.57079632679489661923;
@@ -28,6 +28,7 @@ SlabDoubling slab_doubling(double sigma, double g, std::size_t directions) {
         const double a = result.theta[std::size_t(i)];
         mu(i) = portable::cos(a);
         weight(i) = half_pi * rule.weight[std::size_t(i)];
+        result.weight.push_back(weight(i));
         for (Index j = 0; j < n; ++j) {
             const double b = result.theta[std::size_t(j)];  // travel directions b and pi - b
             within(i, j) = portable::planar_hg_pdf(a - b, g);
@@ -36,7 +37,8 @@ SlabDoubling slab_doubling(double sigma, double g, std::size_t directions) {
     }
     // A layer of optical depth h, radiance averaged over its two faces (box scheme), in sum and difference of exits.
     const double h = std::ldexp(2 * sigma, -doublings);
-    const MatrixXd loss = (MatrixXd::Identity(n, n) - within * weight.asDiagonal()) * (h / 2);
+    const MatrixXd loss =
+        ((1 + absorption / sigma) * MatrixXd::Identity(n, n) - within * weight.asDiagonal()) * (h / 2);
     const MatrixXd turn = across * weight.asDiagonal() * (h / 2);
     const MatrixXd m = mu.asDiagonal();
     const MatrixXd sum = (m + loss - turn).partialPivLu().solve(m - loss + turn);

@@ -111,21 +111,83 @@ SlabModes SlabOrdinates::decompose(Parity parity) const {
     modes.difference = inverse_root.asDiagonal() * t;
     modes.project_sum = modes.k.asDiagonal() * s.transpose() * root.asDiagonal();
     modes.project_difference = modes.k.asDiagonal() * t.transpose() * root.asDiagonal();
+    if (parity == Parity::even) {
+        modes.direct = within + within_mirror;
+        modes.across = across + across_mirror;
+        modes.sum_of_sum = modes.project_sum * modes.sum;
+        modes.difference_of_difference = modes.project_difference * modes.difference;
+    }
     return modes;
 }
 
 namespace {
 
-/// Exit radiance of one parity, all orders: sources `plus`, `minus` [node, incident] times exp(-tau / mu_i) / mu_i.
+/// Radiance that leaves at the nodes, per column.
 struct Radiance {
     MatrixXd back, forward;
 };
 
+/// The conditions at both ends of a layer, for amplitudes A of S and B of D: alpha = (A + B) / 2 decays from x = 0,
+/// beta = (A - B) / 2 from x = depth. Mode 0 where conservative: A = a + k b (depth / 2 - tau), B = b.
+class Ends {
+  public:
+    Ends(const SlabModes& modes, double depth) : m_(modes) {
+        decay_ = (-depth * m_.k.array()).exp();
+        const VectorXd lost = -(-depth * m_.k.array()).unaryExpr([](double v) { return portable::expm1(v); });
+        // S + D at 0 and S - D at depth, halved sum and difference: of x = alpha(0) + beta(depth), y = alpha(0) -
+        // beta(depth).
+        MatrixXd symmetric = m_.sum * (1 + decay_.array()).matrix().asDiagonal();
+        symmetric += m_.difference * lost.asDiagonal();
+        MatrixXd antisymmetric = m_.sum * lost.asDiagonal();
+        antisymmetric += m_.difference * (1 + decay_.array()).matrix().asDiagonal();
+        if (m_.conservative) {
+            slope_ = m_.k(0) * depth / 2;
+            symmetric.col(0) = 2 * m_.sum.col(0);
+            antisymmetric.col(0) = 2 * slope_ * m_.sum.col(0) + 2 * m_.difference.col(0);
+        }
+        symmetric_.compute(symmetric);
+        antisymmetric_.compute(antisymmetric);
+    }
+
+    /// y of the field that isotropic light of radiance 1 on the far side less such light on the near side makes: x is
+    /// 0.
+    VectorXd tilted() const { return antisymmetric_.solve(VectorXd::Constant(m_.k.size(), -4)); }
+
+    /// What leaves where nothing enters, of a source whose particular solution starts from nothing: alpha at depth,
+    /// beta at 0; mode 0's A and B at depth where conservative (its alpha and beta are 0).
+    Radiance leaving(const MatrixXd& alpha, const MatrixXd& beta, const Eigen::RowVectorXd& a_end,
+                     const Eigen::RowVectorXd& b_end) const {
+        const MatrixXd outward = m_.sum - m_.difference;
+        MatrixXd rhs_symmetric = -outward * (alpha + beta), rhs_antisymmetric = outward * (alpha - beta);
+        if (m_.conservative) {
+            const MatrixXd end = m_.sum.col(0) * a_end - m_.difference.col(0) * b_end;
+            rhs_symmetric -= end;
+            rhs_antisymmetric += end;
+        }
+        const MatrixXd x = symmetric_.solve(rhs_symmetric), y = antisymmetric_.solve(rhs_antisymmetric);
+        // I- = S at 0 and I+ = S at depth, since nothing enters there.
+        const MatrixXd alpha0 = (x + y) / 2, beta_end = (x - y) / 2;
+        MatrixXd a0 = alpha0 + decay_.asDiagonal() * beta_end + beta,
+                 a1 = decay_.asDiagonal() * alpha0 + beta_end + alpha;
+        if (m_.conservative) {
+            a0.row(0) = x.row(0) + slope_ * y.row(0);
+            a1.row(0) = x.row(0) - slope_ * y.row(0) + a_end;
+        }
+        return {m_.sum * a0, m_.sum * a1};
+    }
+
+  private:
+    const SlabModes& m_;
+    VectorXd decay_;  ///< exp(-k depth)
+    double slope_ = 0;
+    Eigen::PartialPivLU<MatrixXd> symmetric_, antisymmetric_;
+};
+
+/// Exit radiance of one parity, all orders: sources `plus`, `minus` [node, incident] times exp(-tau / mu_i) / mu_i.
 Radiance exit_radiance(const SlabModes& m, double depth, const std::vector<double>& mu_i, const MatrixXd& plus,
                        const MatrixXd& minus) {
     const Index n = m.k.size(), count = plus.cols();
     const MatrixXd c_sum = m.project_sum * (plus + minus), c_difference = m.project_difference * (plus - minus);
-    // Amplitudes A of S and B of D; alpha = (A + B) / 2 decays from x = 0, beta = (A - B) / 2 from x = 2.
     // alpha(depth) and beta(0) of the particular solution that starts from nothing are slab path factors at mu = 1/k.
     MatrixXd alpha(n, count), beta(n, count);
     for (Index i = 0; i < count; ++i) {
@@ -135,19 +197,9 @@ Radiance exit_radiance(const SlabModes& m, double depth, const std::vector<doubl
             beta(j, i) = (c_sum(j, i) - c_difference(j, i)) / 2 * slab_back_factor(depth, mu, 1 / m.k(j));
         }
     }
-    const VectorXd decay = (-depth * m.k.array()).exp(),
-                   lost = -(-depth * m.k.array()).unaryExpr([](double v) { return portable::expm1(v); });
-    // Nothing enters: S + D = 0 at 0, S - D = 0 at depth. In x = alpha(0) + beta(depth), y = alpha(0) - beta(depth):
-    MatrixXd symmetric = m.sum * (1 + decay.array()).matrix().asDiagonal();
-    symmetric += m.difference * lost.asDiagonal();
-    MatrixXd antisymmetric = m.sum * lost.asDiagonal();
-    antisymmetric += m.difference * (1 + decay.array()).matrix().asDiagonal();
     Eigen::RowVectorXd a_end, b_end;
-    const double slope = m.conservative ? m.k(0) * depth / 2 : 0;
     if (m.conservative) {
-        // Mode 0: B' = source, A' = -k B + source. Homogeneous: A = a + k b (depth/2 - tau), B = b.
-        symmetric.col(0) = 2 * m.sum.col(0);
-        antisymmetric.col(0) = 2 * slope * m.sum.col(0) + 2 * m.difference.col(0);
+        // Mode 0: B' = source, A' = -k B + source.
         a_end.resize(count), b_end.resize(count);
         for (Index i = 0; i < count; ++i) {
             const double mu = mu_i[std::size_t(i)], fed = mu > 0 ? -portable::expm1(-depth / mu) : 1;
@@ -159,23 +211,7 @@ Radiance exit_radiance(const SlabModes& m, double depth, const std::vector<doubl
             alpha(0, i) = beta(0, i) = 0;
         }
     }
-    const MatrixXd outward = m.sum - m.difference;
-    MatrixXd rhs_symmetric = -outward * (alpha + beta), rhs_antisymmetric = outward * (alpha - beta);
-    if (m.conservative) {
-        const MatrixXd end = m.sum.col(0) * a_end - m.difference.col(0) * b_end;
-        rhs_symmetric -= end;
-        rhs_antisymmetric += end;
-    }
-    const MatrixXd x = symmetric.partialPivLu().solve(rhs_symmetric);
-    const MatrixXd y = antisymmetric.partialPivLu().solve(rhs_antisymmetric);
-    // I- = S at 0 and I+ = S at depth, since nothing enters there.
-    const MatrixXd alpha0 = (x + y) / 2, beta_end = (x - y) / 2;
-    MatrixXd a0 = alpha0 + decay.asDiagonal() * beta_end + beta, a1 = decay.asDiagonal() * alpha0 + beta_end + alpha;
-    if (m.conservative) {
-        a0.row(0) = x.row(0) + slope * y.row(0);
-        a1.row(0) = x.row(0) - slope * y.row(0) + a_end;
-    }
-    return {m.sum * a0, m.sum * a1};
+    return Ends(m, depth).leaving(alpha, beta, a_end, b_end);
 }
 
 }  // namespace
@@ -209,6 +245,88 @@ SlabOrdinates::Exit SlabOrdinates::multiply_scattered(double depth, const std::v
         exit.forward[parity] = opaque.inverse().matrix().asDiagonal() * (total.forward - single_forward);
     }
     return exit;
+}
+
+namespace {
+
+/// Means over [0, 1] of exp(-x v) and of exp(-x v) (v - 1/2), x >= 0.
+double mean_decay(double x) { return x > 0 ? -portable::expm1(-x) / x : 1.0; }
+double mean_tilt(double x) {
+    if (x > 1) return (mean_decay(x) - (1 + portable::exp(-x)) / 2) / x;
+    double sum = 0, power = 1;  // sum of (-x)^k / k! k / (2 (k + 1) (k + 2)), whose 17th term is below eps
+    for (int k = 1; k < 17; ++k) {
+        power *= -x / k;
+        sum += power * k / (2.0 * (k + 1) * (k + 2));
+    }
+    return sum;
+}
+
+}  // namespace
+
+SlabOrdinates::Paths SlabOrdinates::multiply_scattered_paths(double depth) const {
+    const SlabModes& m = modes_[0];
+    const SlabDirections& d = directions_;
+    const Index n = m.k.size();
+    const Ends ends(m, depth);
+
+    // Two sources: radiance 1 everywhere, the chances of both sides together, and the chance of the far side less that
+    // of the near one, backwards: alpha = y/2 exp(-k tau), beta = -y/2 exp(-k (depth - tau)), mode 0 of slope -k y.
+    MatrixXd alpha(n, 2), beta(n, 2);
+    Eigen::RowVector2d a_end, b_end;
+    const VectorXd constant = m.project_sum * VectorXd::Constant(n, 2);
+    for (Index j = 0; j < n; ++j) alpha(j, 0) = beta(j, 0) = constant(j) / 2 * depth * mean_decay(m.k(j) * depth);
+    b_end(0) = constant(0) * depth;
+    a_end(0) = -m.k(0) * constant(0) * depth * depth / 2;
+
+    const VectorXd y = ends.tilted();
+    const MatrixXd &of_sum = m.sum_of_sum, &of_difference = m.difference_of_difference;
+    const VectorXd decay = (-depth * m.k.array()).exp();
+    a_end(1) = y(0) * depth * (of_difference(0, 0) - of_sum(0, 0) * m.k(0) * m.k(0) * depth * depth / 12);
+    b_end(1) = 0;
+    for (Index j = 1; j < n; ++j) {
+        // Of mode 0, A = k y (depth / 2 - tau) and B = y.
+        const double k = m.k(j), mean = mean_decay(k * depth), tilt = mean_tilt(k * depth);
+        double sum = y(0) * depth * (of_difference(j, 0) * mean + of_sum(j, 0) * m.k(0) * depth * tilt);
+        for (Index i = 1; i < n; ++i) {
+            // exp(-k (depth - tau)) times either exponential of mode i, integrated over the depth.
+            const double along = std::max(decay(i), decay(j)) * mean_decay(std::abs(m.k(i) - k) * depth),
+                         against = mean_decay((m.k(i) + k) * depth);
+            sum += y(i) / 2 * depth *
+                   ((of_sum(j, i) + of_difference(j, i)) * along - (of_sum(j, i) - of_difference(j, i)) * against);
+        }
+        alpha(j, 1) = sum / 2;
+        beta(j, 1) = -sum / 2;
+        // Mode 0 fed by mode j: A' = -k B + D's source, B' = S's source, odd about the middle.
+        a_end(1) += y(j) * depth * (of_difference(0, j) * mean + of_sum(0, j) * m.k(0) * depth * tilt);
+    }
+    alpha.row(0).setZero(), beta.row(0).setZero();
+    const MatrixXd all = ends.leaving(alpha, beta, a_end, b_end).back;
+
+    // Less what did not scatter, or once. mu times a factor is the same for the way there and back.
+    Paths paths{(all.col(0) - all.col(1)) / 2, (all.col(0) + all.col(1)) / 2};
+    const auto cosine = Eigen::Map<const VectorXd>(d.mu.data(), n),
+               weight = Eigen::Map<const VectorXd>(d.weight.data(), n);
+    for (Index j = 0; j < n; ++j) {
+        const double mu = cosine(j);
+        paths.forward(j) -= depth / mu * portable::exp(-depth / mu);
+        for (Index i = 0; i <= j; ++i) {
+            const double to = cosine(i), back_again = mu / to;
+            const double forward =
+                m.direct(i, j) * slab_forward_factor(depth, mu, to) * slab_forward_path(depth, mu, to);
+            const double back = m.across(i, j) * slab_back_factor(depth, mu, to) * slab_back_path(depth, mu, to);
+            paths.forward(j) -= weight(i) * forward;
+            paths.back(j) -= weight(i) * back;
+            if (i == j) continue;
+            paths.forward(i) -= weight(j) * back_again * forward;
+            paths.back(i) -= weight(j) * back_again * back;
+        }
+    }
+    for (Index j = 0; j < n; ++j) {
+        const double scattered = -portable::expm1(-depth / cosine(j));
+        paths.forward(j) /= scattered;
+        paths.back(j) /= scattered;
+    }
+    return paths;
 }
 
 }  // namespace medulla::sim2d

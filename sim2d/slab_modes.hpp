@@ -21,6 +21,9 @@ struct SlabModes {
     Eigen::VectorXd k;
     Eigen::MatrixXd sum, difference;                  ///< S and D of mode m at node j, [j, m]
     Eigen::MatrixXd project_sum, project_difference;  ///< [m, j]: mode amplitudes of a source at the nodes
+    /// Even parity: the phase function from node to node, within a hemisphere and across [j, j]; what a source like
+    /// mode n's sum (difference) puts into the sum (difference) of mode m [m, n].
+    Eigen::MatrixXd direct, across, sum_of_sum, difference_of_difference;
     bool conservative = false;  ///< mode 0 is the diffusion mode: S constant in tau, D linear (even parity only)
 };
 
@@ -34,8 +37,17 @@ class SlabOrdinates {
     struct Exit {
         Eigen::MatrixXd back[2], forward[2];  ///< [parity]
     };
+    /// Per direction of incidence: path [mean free paths] times energy of light scattered at least twice, divided by
+    /// 1 - exp(-depth / mu).
+    struct Paths {
+        Eigen::VectorXd back, forward;
+    };
     /// @param depth optical depth 2 sigma, > 0   @param theta_i in [0, pi/2] [radians], travelling towards +theta_i
     Exit multiply_scattered(double depth, const std::vector<double>& theta_i) const;
+
+    /// By reciprocity: incident light's path times its chance of a side is the radiance of a source that shines where
+    /// and as the chance is, the field of isotropic light on that side. One solve for all angles, of even modes alone.
+    Paths multiply_scattered_paths(double depth) const;
 
     const SlabDirections& directions() const noexcept { return directions_; }
     Interpolation interpolation() const noexcept { return resolved_ ? Interpolation::spectral : Interpolation::linear; }

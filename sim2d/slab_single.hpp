@@ -15,6 +15,23 @@ double slab_back_factor(double depth, double mu_i, double mu_r) noexcept;
 /// = b (exp(-a) - exp(-b)) / (b - a), a = depth / mu_r, b = depth / mu_i, without cancellation at a = b.
 double slab_forward_factor(double depth, double mu_i, double mu_r) noexcept;
 
+/// Mean path, in mean free paths, of the light that slab_back_factor counts: (integral of s exp(-s) over [0, b]) /
+/// (1 - exp(-b)), b = depth / mu_r + depth / mu_i. Infinite depth / mu: its limit 1.
+double slab_back_path(double depth, double mu_i, double mu_r) noexcept;
+
+/// The same for slab_forward_factor, depth / mu_r finite: the longer way has the rest of the depth, evenly weighted by
+/// exp(-s). mu_i = 0: 1 + depth / mu_r.
+double slab_forward_path(double depth, double mu_i, double mu_r) noexcept;
+
+/// What leaves either side of the slab, per unit of scattered light.
+struct SlabSides {
+    double back = 0, forward = 0;
+};
+
+/// Path times energy of the light scattered exactly once, over slab_energy: [radii]. By quadrature over the directions
+/// in which it leaves, graded to grazing and to the phase function's peak: to 1e-9 for every sigma > 0, however small.
+SlabSides slab_single_paths(double sigma, double g, double theta_i);
+
 /// Raw density per radian of theta_r of the energy scattered exactly once that leaves on the side of the light.
 /// The sign is that of physics.md: theta_i inclines the direction towards the light, so p is read at
 /// pi - (theta_r - theta_i).

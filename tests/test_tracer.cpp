@@ -379,6 +379,28 @@ TEST_CASE("Walks with absorption: the deterministic solver's lobes, energies and
     }
 }
 
+TEST_CASE("Walks in the slab: the deterministic solver's mean paths on either side", "[tracer][paths]") {
+    // Means over 20 repetitions at 5 of their standard errors; a path is a quotient, of bias O(1 / paths).
+    for (const double g : {-0.5, 0.0, 0.9}) {
+        const SlabSolver solver(g);
+        for (const double sigma : {0.1, 1.0, 8.0})
+            for (const double theta : {0.0, 1.2}) {
+                const SlabProfile exact = solver.solve(sigma, {theta}, 90)[0];
+                std::vector<double> back, forward;
+                for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+                    const SlabProfile p = trace_expected_slab(sigma, g, theta, 90, options(4096, seed)).profile;
+                    back.push_back(p.back.mean_length), forward.push_back(p.forward.mean_length);
+                }
+                const Moments b = moments(back), f = moments(forward);
+                INFO("sigma " << sigma << " g " << g << " theta_i " << theta << " back " << b.mean << " +- " << b.error
+                              << " true " << exact.back.mean_length << " forward " << f.mean << " +- " << f.error
+                              << " true " << exact.forward.mean_length);
+                CHECK(std::abs(b.mean - exact.back.mean_length) < 5 * b.error + 1e-3 * b.mean);
+                CHECK(std::abs(f.mean - exact.forward.mean_length) < 5 * f.error + 1e-3 * f.mean);
+            }
+    }
+}
+
 TEST_CASE("Walks without absorption in the list are those of the plain tracer, byte for byte", "[tracer][absorption]") {
     for (const double sigma : {0.0, 1e-8, 3.0}) {
         const Traced<Profile> plain = trace_expected_disc(sigma, 0.8, 0.4, 96, options(2048));

@@ -143,10 +143,22 @@ double extrapolate(const std::vector<double>& x, const std::vector<double>& y, d
     return value;
 }
 
+namespace {
+
+/// Mean over the interval of the exponential through its ends' values; of a line where one is 0 (a few analog paths).
+double logarithmic_mean(double a, double b) {
+    if (!(a > 0 && b > 0)) return (a + b) / 2;
+    const double ratio = std::log(b / a);
+    return std::abs(ratio) > 1e-4 ? (b - a) / ratio : (a + b) / 2;  // equal to ratio^2 / 12
+}
+
+}  // namespace
+
 std::vector<double> survival_lengths(const Table& table) {
     if (!table.has_axis("absorption")) return {};
     std::vector<double> lengths = table.mean_length;
-    const std::vector<double>&sigma = table.axis("sigma").values, &h = table.axis("h").values;
+    const std::vector<double>&sigma = table.axis("sigma").values, &absorption = table.axis("absorption").values,
+          &h = table.axis("h").values;
     const auto unknown = [&](double s, double offset) { return !(azimuthal_energy(s, offset) > 0); };
     for (std::size_t cell = 0; cell < table.cells(); ++cell) {
         const double a = table.parameter(cell, "absorption"), s = table.parameter(cell, "sigma"),
@@ -156,24 +168,39 @@ std::vector<double> survival_lengths(const Table& table) {
         if (!(left > 0)) throw Error("table {}: {}: expected an energy > 0", table.name, table.describe(cell));
         lengths[cell] = -std::log(left) / a;
     }
-    // Three known neighbours, `step` cells apart; where there are fewer, the polynomial through those.
+    // a l is the integral of the mean length over the absorption. By logarithmic means between the nodes it is a few
+    // percent off, and just so where it is known: the ratio of up to three neighbours, `step` cells apart, mends it.
+    const std::size_t along = h.size(), row = table.cells() / sigma.size();
+    const auto integrals = [&](std::size_t cell) {  // `cell` has the least absorption
+        std::vector<double> sums{absorption[0] * table.mean_length[cell]};
+        for (std::size_t k = 1; k < absorption.size(); ++k) {
+            const double from = table.mean_length[cell + (k - 1) * along], to = table.mean_length[cell + k * along];
+            sums.push_back(sums.back() + (absorption[k] - absorption[k - 1]) * logarithmic_mean(from, to));
+        }
+        return sums;
+    };
     const auto extend = [&](std::size_t cell, std::ptrdiff_t step, const std::vector<double>& x) {
-        std::vector<double> y;
-        for (std::size_t i = 1; i <= x.size(); ++i)
-            y.push_back(lengths[cell + static_cast<std::size_t>(step * static_cast<std::ptrdiff_t>(i))]);
-        if (!x.empty()) lengths[cell] = extrapolate(x, y, 0);
+        const std::vector<double> here = integrals(cell);
+        std::vector<std::vector<double>> ratios(absorption.size());
+        for (std::size_t i = 1; i <= x.size(); ++i) {
+            const std::size_t other = cell + static_cast<std::size_t>(step * static_cast<std::ptrdiff_t>(i));
+            const std::vector<double> there = integrals(other);
+            for (std::size_t k = 0; k < absorption.size(); ++k)
+                ratios[k].push_back(there[k] > 0 ? lengths[other + k * along] / there[k] : 1);
+        }
+        for (std::size_t k = 0; k < absorption.size(); ++k)
+            if (absorption[k] > 0 && !x.empty()) lengths[cell + k * along] = here[k] * extrapolate(x, ratios[k], 0);
     };
     std::vector<double> half_chords, thin;
     for (std::size_t i = h.size() - 1; i-- > 0 && half_chords.size() < 3;)
         half_chords.push_back(std::sqrt((1 - h[i]) * (1 + h[i])));
     for (std::size_t i = 1; i < sigma.size() && thin.size() < 3; ++i) thin.push_back(sigma[i]);
-    const auto row = static_cast<std::ptrdiff_t>(table.cells() / sigma.size());
     for (const bool rim : {true, false})  // the rim first, so that sigma = 0 has neighbours there
         for (std::size_t cell = 0; cell < table.cells(); ++cell) {
             const double s = table.parameter(cell, "sigma"), offset = table.parameter(cell, "h");
-            if (table.parameter(cell, "absorption") == 0) continue;
+            if (table.parameter(cell, "absorption") != absorption[0]) continue;
             if (rim && s > 0 && offset == 1) extend(cell, -1, half_chords);
-            if (!rim && s == 0) extend(cell, row, thin);
+            if (!rim && s == 0) extend(cell, static_cast<std::ptrdiff_t>(row), thin);
         }
     return lengths;
 }

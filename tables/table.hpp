@@ -57,12 +57,13 @@ std::optional<double> closed_form_energy(const Table& table, std::size_t cell);
 void check_cells(const Table& table, const std::string& where);
 /// Where a table has an axis of absorption a: for each cell the length l by which exp(-a l) of the light that is
 /// scattered without absorption is left, -log(energy / E) / a, E in closed form; at a = 0 the mean length, its limit.
-/// Where E = 0 it is extrapolated by the parabola through the next three nodes, in sigma (sigma = 0) or in
-/// sqrt(1 - h^2) (h = 1). Throws Error where a cell has no energy. Without such an axis: empty.
+/// Where E = 0 (sigma = 0, h = 1) it is the integral of the mean length over the absorption, -d log(energy) / da, which
+/// is known there too. Throws Error where a cell has no energy. Without such an axis: empty.
 std::vector<double> survival_lengths(const Table& azimuthal);
 
 /// The polynomial through (x, y) at another place.
 double extrapolate(const std::vector<double>& x, const std::vector<double>& y, double to);
+
 
 /// Lobe of one side of a longitudinal table, or the azimuthal table, as an array [cells of that side][bins].
 std::vector<double> side_lobes(const Table& table, std::size_t side);

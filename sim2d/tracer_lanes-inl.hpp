@@ -159,6 +159,7 @@ std::size_t Choose(WalkTracer::State& st, std::size_t count) {
         const VF escape = hn::Mul(weight, hn::MulAdd(beta, hn::Sub(turned, straight), straight));
         const VF chance = hn::Min(Constant(1), hn::Mul(escape, Constant(1 / st.cell.plan.pay)));
         const MF paid = hn::And(hn::Lt(hn::LoadU(f, &w.chance[i]), chance), hn::FirstN(f, count - i));
+        if (hn::AllFalse(f, paid)) continue;  // as deep in dense media
         const Squeeze squeeze(paid);
         squeeze.Store(weight, &p.weight[out]), squeeze.Store(chance, &p.chance[out]),
             squeeze.Store(hn::LoadU(U(), &w.place[i]), &p.place[out]);

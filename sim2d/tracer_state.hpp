@@ -11,7 +11,7 @@
 namespace medulla::sim2d {
 
 inline constexpr std::size_t kLaneMargin = 64;  ///< arrays are this much longer than what they hold
-inline constexpr std::size_t kBatch = 2048;     ///< walks followed together
+inline constexpr std::size_t kBatch = 4096;     ///< walks followed together; their arrays fit the second cache
 inline constexpr std::uint32_t kLatticeDims = 25;
 
 /// Walks of a batch: position, direction, weight. Disc: s = 1 - r^2, kept beside x and y without cancellation.

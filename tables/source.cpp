@@ -168,14 +168,18 @@ class PackSource : public Source {
         const TableView& table = pack_[kind];
         const Contraction contraction = contract(table, query(at));
         const std::uint32_t exit = table.parameter_axes(), rows = table.layout.axes[exit].spans + 3;
-        const std::uint32_t stride = table.layout.rank_stride, middle = table.even_stride();
         // Spline coefficients for y > 0 and y < 0: even part plus and minus the odd one.
         std::vector<double> coefficients[2] = {std::vector<double>(rows), std::vector<double>(rows)};
         for (std::uint32_t j = 0; j < rows; ++j) {
-            const unsigned char* row = table.row(exit, j);
+            const unsigned char* block = table.row(exit, j);
             double part[2] = {0, 0};
-            for (std::uint32_t r = 0; r < stride; ++r)
-                part[r < middle ? 0 : 1] += static_cast<double>(contraction.weight[r]) * load_number(row, r);
+            for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
+                const std::uint32_t bits = table.bits(first);
+                for (std::uint32_t r = 0; r < rank_multiple; ++r)
+                    part[first < table.even_stride() ? 0 : 1] +=
+                        static_cast<double>(contraction.weight[first + r]) * load_number(block, bits, r);
+                block += bits;
+            }
             const auto scale = static_cast<double>(contraction.inverse_integral);
             coefficients[0][j] = (part[0] + part[1]) * scale, coefficients[1][j] = (part[0] - part[1]) * scale;
         }

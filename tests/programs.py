@@ -126,7 +126,11 @@ class Programs(unittest.TestCase):
             report = json.loads(out)
             for kind, error in report["errors"].items():
                 self.assertLessEqual(error["relative_l2"], bound)
-                self.assertAlmostEqual(report["factors"][kind]["relative_l2_in_pack"] / error["relative_l2"], 1, delta=0.01)
+                factors = report["factors"][kind]
+                stated = math.hypot(factors["relative_l2_in_pack"], factors["relative_l2_of_rounding"])
+                # Rounding is stated in the metric of the solver, the bins' but for the condition of B-splines: too much.
+                self.assertLess(0.99 * factors["relative_l2_in_pack"], error["relative_l2"])
+                self.assertLess(error["relative_l2"], 1.01 * stated)
 
     def test_verify_checks_every_file(self):
         with open(self.path("bad.furpack"), "wb") as f:
@@ -175,8 +179,8 @@ class Programs(unittest.TestCase):
             self.assertEqual(run("furtable", "compress", self.path("t.h5"), "--max-error", bound, "-o", pack)[0], 0)
             self.assertEqual(run("furtable", "verify", pack)[0], 0, bound)
             errors = json.loads(run("furtable", "diff", self.path("t.h5"), pack, "--json")[1])["errors"]
-            for kind in errors.values():  # rounding to 12 bits adds up to 5 %
-                self.assertLessEqual(kind["relative_l2"], 1.05 * bound)
+            for kind in errors.values():
+                self.assertLessEqual(kind["relative_l2"], bound)
 
     def test_no_input_is_written_over(self):
         with open(self.path("t.h5"), "rb") as f:

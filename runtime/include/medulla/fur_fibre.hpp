@@ -417,10 +417,9 @@ MEDULLA_FN float survival_at(const FurFibre<Channels>& fibre, const Longitudinal
     const TableView& table = fibre.survival;
     if (!table) return 1;
     const AxisPoint at = axis_point(table, 3, offset);
-    const std::uint32_t stride = table.layout.rank_stride;
     float length = 0;
     for (std::uint32_t t = 0; t < 4; ++t)
-        length += at.weights.w[t] * detail::row_sum(table, 3, at.span + t, m.survival.weight, 0, stride);
+        length += at.weights.w[t] * detail::row_sums(table, 3, at.span + t, m.survival.weight).even;
     return survival_of(m.absorbed, length);
 }
 template <int Channels>

@@ -42,10 +42,10 @@ MEDULLA_FN float dip(const AxisView<float>& axis, std::uint32_t span, const floa
 /// Calls put(k, positive, negative) with the coefficients of the contracted lobe for y >= 0 and y < 0.
 template <class Put>
 MEDULLA_FN void exit_coefficients(const TableView& view, const float* weight, Put&& put) noexcept {
-    const std::uint32_t k = view.parameter_axes(), even = view.even_stride(), all = view.layout.rank_stride;
+    const std::uint32_t k = view.parameter_axes();
     for (std::uint32_t row = 0; row < view.layout.axes[k].spans + 3; ++row) {
-        const float e = row_sum(view, k, row, weight, 0, even), o = row_sum(view, k, row, weight, even, all);
-        put(row, e + o, e - o);
+        const RowSums sum = row_sums(view, k, row, weight);
+        put(row, sum.even + sum.odd, sum.even - sum.odd);
     }
 }
 

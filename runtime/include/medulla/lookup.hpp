@@ -45,14 +45,27 @@ namespace detail {
 
 /// Eight components side by side: AVX2 where the renderer is built for it, SSE2, which every x86-64 has, or plain
 /// floats.
+template <int bits>
+struct Bits {};
+
 #if defined(MEDULLA_SSE2)
-/// Eight numbers as 16-bit words, times 16.
-MEDULLA_HOT __m128i words_of(const unsigned char* numbers) noexcept {
-    std::int32_t bits;
-    std::memcpy(&bits, numbers + 8, sizeof bits);
-    const __m128i upper = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(numbers)), lower = _mm_cvtsi32_si128(bits);
-    const __m128i mask = _mm_set1_epi8(char(0xf0)), even = _mm_and_si128(_mm_slli_epi16(lower, 4), mask);
-    return _mm_unpacklo_epi8(_mm_unpacklo_epi8(even, _mm_and_si128(lower, mask)), upper);
+/// Eight numbers of a block as 16-bit words.
+template <int bits>
+MEDULLA_HOT __m128i words_of(const unsigned char* block, Bits<bits>) noexcept {
+    /// Halves of bytes, in order, in the upper half of a byte each.
+    const auto halves = [](const unsigned char* four) {
+        std::int32_t packed;
+        std::memcpy(&packed, four, sizeof packed);
+        const __m128i both = _mm_cvtsi32_si128(packed), mask = _mm_set1_epi8(char(0xf0));
+        return _mm_unpacklo_epi8(_mm_and_si128(_mm_slli_epi16(both, 4), mask), _mm_and_si128(both, mask));
+    };
+    const auto bytes = [](const unsigned char* eight) {
+        return _mm_loadl_epi64(reinterpret_cast<const __m128i*>(eight));
+    };
+    if constexpr (bits == 4) return _mm_unpacklo_epi8(_mm_setzero_si128(), halves(block));
+    if constexpr (bits == 8) return _mm_unpacklo_epi8(_mm_setzero_si128(), bytes(block));
+    if constexpr (bits == 12) return _mm_unpacklo_epi8(halves(block + 8), bytes(block));
+    if constexpr (bits == 16) return _mm_unpacklo_epi8(bytes(block + 8), bytes(block));
 }
 #endif
 #if defined(MEDULLA_SSE2) && defined(__AVX2__)
@@ -62,8 +75,9 @@ struct Eight {
 MEDULLA_HOT Eight zero_eight() noexcept { return {_mm256_setzero_ps()}; }
 MEDULLA_HOT Eight load_eight(const float* x) noexcept { return {_mm256_loadu_ps(x)}; }
 MEDULLA_HOT void store_eight(Eight a, float* x) noexcept { _mm256_storeu_ps(x, a.v); }
-MEDULLA_HOT Eight convert_eight(const unsigned char* numbers) noexcept {
-    return {_mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_cvtepi16_epi32(words_of(numbers)), 4))};
+template <int bits>
+MEDULLA_HOT Eight convert_eight(const unsigned char* block, Bits<bits> width) noexcept {
+    return {_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(words_of(block, width)))};
 }
 MEDULLA_HOT Eight times(Eight a, Eight b) noexcept { return {_mm256_mul_ps(a.v, b.v)}; }
 MEDULLA_HOT Eight times(float a, Eight b) noexcept { return {_mm256_mul_ps(_mm256_set1_ps(a), b.v)}; }
@@ -80,11 +94,12 @@ struct Eight {
 MEDULLA_HOT Eight zero_eight() noexcept { return {_mm_setzero_ps(), _mm_setzero_ps()}; }
 MEDULLA_HOT Eight load_eight(const float* x) noexcept { return {_mm_loadu_ps(x), _mm_loadu_ps(x + 4)}; }
 MEDULLA_HOT void store_eight(Eight a, float* x) noexcept { _mm_storeu_ps(x, a.low), _mm_storeu_ps(x + 4, a.high); }
-MEDULLA_HOT Eight convert_eight(const unsigned char* numbers) noexcept {
+template <int bits>
+MEDULLA_HOT Eight convert_eight(const unsigned char* block, Bits<bits> width) noexcept {
     // A word moved to the upper half and shifted down keeps its sign.
-    const __m128i q = words_of(numbers);
-    return {_mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(q, q), 20)),
-            _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(q, q), 20))};
+    const __m128i q = words_of(block, width);
+    return {_mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpacklo_epi16(q, q), 16)),
+            _mm_cvtepi32_ps(_mm_srai_epi32(_mm_unpackhi_epi16(q, q), 16))};
 }
 MEDULLA_HOT Eight times(Eight a, Eight b) noexcept { return {_mm_mul_ps(a.low, b.low), _mm_mul_ps(a.high, b.high)}; }
 MEDULLA_HOT Eight times(float a, Eight b) noexcept {
@@ -107,9 +122,10 @@ MEDULLA_HOT Eight load_eight(const float* x) noexcept {
     return a;
 }
 MEDULLA_HOT void store_eight(const Eight& a, float* x) noexcept { std::memcpy(x, a.x, sizeof a.x); }
-MEDULLA_HOT Eight convert_eight(const unsigned char* numbers) noexcept {
+template <int bits>
+MEDULLA_HOT Eight convert_eight(const unsigned char* block, Bits<bits>) noexcept {
     Eight a;
-    for (std::uint32_t r = 0; r < rank_multiple; ++r) a.x[r] = float(load_number(numbers, r));
+    for (std::uint32_t r = 0; r < rank_multiple; ++r) a.x[r] = float(load_number(block, bits, r));
     return a;
 }
 MEDULLA_HOT Eight times(const Eight& a, Eight b) noexcept {
@@ -130,11 +146,35 @@ MEDULLA_HOT float sum_of(const Eight& a) noexcept {
 }
 #endif
 
-/// sum over four rows of w[t] * row_t, for eight components; rows are `step` bytes apart.
-MEDULLA_HOT Eight blend(const unsigned char* row, std::size_t step, const SplineWeights<float>& w) noexcept {
-    const Eight a = times(w.w[0], convert_eight(row)), b = times(w.w[1], convert_eight(row + step));
-    const Eight c = times(w.w[2], convert_eight(row + 2 * step)), d = times(w.w[3], convert_eight(row + 3 * step));
-    return plus(plus(a, b), plus(c, d));
+/// f(Bits<b>) of a block's width.
+template <class F>
+MEDULLA_HOT Eight of_width(std::uint32_t bits, F&& f) noexcept {
+    switch (bits) {
+        case 4:
+            return f(Bits<4>{});
+        case 8:
+            return f(Bits<8>{});
+        case 12:
+            return f(Bits<12>{});
+        default:
+            return f(Bits<16>{});
+    }
+}
+
+MEDULLA_HOT Eight convert_eight(const unsigned char* block, std::uint32_t bits) noexcept {
+    return of_width(bits, [=](auto width) { return convert_eight(block, width); });
+}
+
+/// sum over four rows of w[t] * row_t, for the components of a block; rows are `step` bytes apart.
+MEDULLA_HOT Eight blend(const unsigned char* block, std::uint32_t bits, std::size_t step,
+                        const SplineWeights<float>& w) noexcept {
+    return of_width(bits, [&](auto width) {
+        const Eight a = times(w.w[0], convert_eight(block, width)),
+                    b = times(w.w[1], convert_eight(block + step, width)),
+                    c = times(w.w[2], convert_eight(block + 2 * step, width)),
+                    d = times(w.w[3], convert_eight(block + 3 * step, width));
+        return plus(plus(a, b), plus(c, d));
+    });
 }
 
 MEDULLA_HOT Eight load_eight(const TableView& table, std::uint32_t offset, std::uint32_t first) noexcept {
@@ -143,19 +183,23 @@ MEDULLA_HOT Eight load_eight(const TableView& table, std::uint32_t offset, std::
     return load_eight(x);
 }
 
-/// sum over r in [from, to) of weight[r] * (row `row` of axis k)[r].
-MEDULLA_FN float row_sum(const TableView& table, std::uint32_t k, std::uint32_t row, const float* weight,
-                         std::uint32_t from, std::uint32_t to) noexcept {
-    const unsigned char* bytes = table.row(k, row);
-    Eight sum = zero_eight();
-    for (std::uint32_t first = from; first < to; first += rank_multiple)
-        sum = plus(sum, times(load_eight(weight + first), convert_eight(bytes + row_bytes(first))));
-    return sum_of(sum);
+/// Sums over the even and over the odd components of weight[r] * (row `row` of axis k)[r].
+struct RowSums {
+    float even, odd;
+};
+MEDULLA_FN RowSums row_sums(const TableView& table, std::uint32_t k, std::uint32_t row, const float* weight) noexcept {
+    const unsigned char* block = table.row(k, row);
+    Eight sum[2] = {zero_eight(), zero_eight()};
+    const auto add = [&](Eight& part, std::uint32_t first) {
+        const std::uint32_t bits = table.bits(first);
+        part = plus(part, times(load_eight(weight + first), convert_eight(block, bits)));
+        block += bits;
+    };
+    const std::uint32_t even = table.even_stride(), stride = table.layout.rank_stride;
+    for (std::uint32_t first = 0; first < even; first += rank_multiple) add(sum[0], first);
+    for (std::uint32_t first = even; first < stride; first += rank_multiple) add(sum[1], first);
+    return {sum_of(sum[0]), sum_of(sum[1])};
 }
-
-}  // namespace detail
-
-namespace detail {
 
 /// numeric_limits' own is no device function.
 MEDULLA_FN float not_a_number() noexcept {
@@ -197,21 +241,24 @@ MEDULLA_HOT AxisPoint axis_point(const TableView& table, std::uint32_t k, const 
 /// to[r] = from[r] * (factor r of axis k at the point).
 MEDULLA_HOT void contract_axis(const TableView& table, std::uint32_t k, const AxisPoint& at, const float* from,
                                float* to) noexcept {
-    const unsigned char* row = table.row(k, at.span);
-    const std::uint32_t stride = table.layout.rank_stride;
-    for (std::uint32_t first = 0; first < stride; first += rank_multiple) {
-        const detail::Eight factor = detail::blend(row + row_bytes(first), row_bytes(stride), at.weights);
+    const unsigned char* block = table.row(k, at.span);
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
+        const std::uint32_t bits = table.bits(first);
+        const detail::Eight factor = detail::blend(block, bits, table.layout.row_bytes, at.weights);
         detail::store_eight(detail::times(detail::load_eight(from + first), factor), to + first);
+        block += bits;
     }
 }
 /// to[r] = from[r] * (row `row` of axis k)[r].
 MEDULLA_FN void scale_by_row(const TableView& table, std::uint32_t k, std::uint32_t row, const float* from,
                              float* to) noexcept {
-    const unsigned char* bytes = table.row(k, row);
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple)
-        detail::store_eight(
-            detail::times(detail::load_eight(from + first), detail::convert_eight(bytes + row_bytes(first))),
-            to + first);
+    const unsigned char* block = table.row(k, row);
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
+        const std::uint32_t bits = table.bits(first);
+        const detail::Eight factor = detail::convert_eight(block, bits);
+        detail::store_eight(detail::times(detail::load_eight(from + first), factor), to + first);
+        block += bits;
+    }
 }
 MEDULLA_FN void contract_axis(const TableView& table, std::uint32_t k, float x, const float* from, float* to) noexcept {
     contract_axis(table, k, axis_point(table, k, x), from, to);
@@ -265,13 +312,14 @@ MEDULLA_FN Contraction contract(const TableView& table, const LobeQuery& query) 
 
 /// Density per radian at an exit direction, before anything is held to >= 0.
 MEDULLA_HOT float signed_lobe(const TableView& table, const Contraction& contraction, const ExitPoint& to) noexcept {
-    const unsigned char* row = table.row(table.parameter_axes(), to.at.span);
+    const unsigned char* block = table.row(table.parameter_axes(), to.at.span);
     const std::uint32_t stride = table.layout.rank_stride, even = table.even_stride();
     detail::Eight sum[2] = {detail::zero_eight(), detail::zero_eight()};
     const auto add = [&](detail::Eight& part, std::uint32_t first) {
-        part =
-            detail::plus(part, detail::times(detail::load_eight(contraction.weight + first),
-                                             detail::blend(row + row_bytes(first), row_bytes(stride), to.at.weights)));
+        const std::uint32_t bits = table.bits(first);
+        const detail::Eight factor = detail::blend(block, bits, table.layout.row_bytes, to.at.weights);
+        part = detail::plus(part, detail::times(detail::load_eight(contraction.weight + first), factor));
+        block += bits;
     };
     for (std::uint32_t first = 0; first < even; first += rank_multiple) add(sum[0], first);
     for (std::uint32_t first = even; first < stride; first += rank_multiple) add(sum[1], first);

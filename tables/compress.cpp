@@ -15,17 +15,23 @@ namespace medulla::tables {
 namespace {
 
 constexpr int rank_step = static_cast<int>(rank_multiple), greatest_rank = static_cast<int>(max_rank);
-/// Of the energies: more rank is only rounding. The slab's have three small axes, the disc's with absorption four.
-int energy_rank(const Part& part) { return part.kind == TableKind::survival ? 48 : 32; }
+/// Bits that a number takes on average where rounding is in balance with components left out, before solves say better,
+/// and where more components would not pay.
+constexpr double usual_bits = 9, ample_bits = 12;
+/// Of the energies: more rank is only rounding. The slab's have three small axes, the disc's with absorption four. A
+/// small pack spends an eighteenth of its bytes on them.
+int energy_rank(const Part& part, const CompressOptions& options) {
+    const int most = part.kind == TableKind::survival ? 48 : 32;
+    if (!options.max_bytes) return most;
+    const double room = static_cast<double>(*options.max_bytes) / 18 / part.component_bytes(ample_bits);
+    return std::clamp(static_cast<int>(room / rank_step) * rank_step, rank_step, most);
+}
 /// Of the solves that say how hard each part is.
 constexpr int pilot_rank = 32;
 /// Room for the provenance text while components are shared out; what it does not take goes to bits.
 constexpr std::size_t text_room = 800;
 /// Errors of these tables fall about as rank^-2 (docs/accuracy.md), which is all that sharing out components needs.
 constexpr double decay = 2;
-/// Bits that a number takes on average where rounding is in balance with components left out, before solves say better,
-/// and where more components would not pay.
-constexpr double usual_bits = 9, ample_bits = 12;
 
 /// Relative L2 standard error of all lobes of one kind together.
 double table_noise(const Table& table, TableKind kind) {
@@ -299,7 +305,7 @@ void share_again(Solves& solves, const CompressOptions& options, const Source* t
 void solve_to(Solves& solves, double error, const CompressOptions& options, const Source* tables) {
     for (const auto& [first, last] : kinds_of(solves)) {
         if (!solves[first].part->lobes()) {
-            solves[first].rank = energy_rank(*solves[first].part);
+            solves[first].rank = energy_rank(*solves[first].part, options);
             continue;
         }
         double spline = 0;
@@ -418,7 +424,7 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
     Solves solves;
     const bool searched = options.max_error || options.max_bytes;
     const int rank = searched ? pilot_rank : options.rank;
-    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank(part)});
+    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank(part, options)});
     std::unique_ptr<Source> source;
     if (options.solver == tensor::Solver::nonnegative) source = table_source(tables);
     if (searched) run(solves, options, true, source.get());

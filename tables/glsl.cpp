@@ -126,7 +126,8 @@ float @_sum(vec4 low, vec4 high) {
     return (both.x + both.z) + (both.y + both.w);
 }
 
-// Contracts the parameter axes of a table.
+// Contracts the parameter axes of a table, as the runtime's contract_signed: counting a lobe's dips below 0 would read
+// the whole exit factor.
 @_contraction_t @_contract(int table, @_query_t at) {
     @_contraction_t result;
     int scales = @_whole(table + 5) / 4, vectors = @_stride(table) / 4;

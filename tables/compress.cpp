@@ -17,13 +17,13 @@ namespace {
 constexpr int rank_step = static_cast<int>(rank_multiple), greatest_rank = static_cast<int>(max_rank);
 /// Bits that a number takes on average where rounding is in balance with components left out, before solves say better,
 /// and where more components would not pay.
-constexpr double usual_bits = 9, ample_bits = 12;
+constexpr double usual_bits = 9, ample_bits = 12.5;
 /// Of the energies: more rank is only rounding. The slab's have three small axes, the disc's with absorption four. A
-/// small pack spends an eighteenth of its bytes on them.
+/// small pack spends at most a 17th of its bytes on them.
 int energy_rank(const Part& part, const CompressOptions& options) {
     const int most = part.kind == TableKind::survival ? 48 : 32;
     if (!options.max_bytes) return most;
-    const double room = static_cast<double>(*options.max_bytes) / 18 / part.component_bytes(ample_bits);
+    const double room = static_cast<double>(*options.max_bytes) / 17 / part.component_bytes(usual_bits);
     return std::clamp(static_cast<int>(room / rank_step) * rank_step, rank_step, most);
 }
 /// Of the solves that say how hard each part is.

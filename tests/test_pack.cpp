@@ -123,6 +123,44 @@ TEST_CASE("A row of blocks of unlike width has the numbers of each", "[pack]") {
     }
 }
 
+TEST_CASE("Rows blended and summed are those of eight components at a time, to the bit", "[pack]") {
+    const OpenResult opened = open_pack(default_pack_words, default_pack_size);
+    REQUIRE(opened.status == PackStatus::ok);
+    for (const TableView& table : opened.pack.tables) {
+        if (!table) continue;
+        const std::uint32_t k = table.layout.axis_count - 1, stride = table.layout.rank_stride;
+        Contraction c, scaled;
+        start_contraction(table, c.weight);
+        for (std::uint32_t row = 0; row + 4 <= table.layout.axes[k].spans + 3; ++row) {
+            const AxisPoint at = {row, {{0.1f, 0.55f, 0.33f, 0.02f}}};
+            detail::RowSums sums[4];
+            detail::four_row_sums(table, k, row, c.weight, sums);
+            for (std::uint32_t i = 0; i < 4; ++i) {
+                const detail::RowSums one = detail::row_sums(table, k, row + i, c.weight);
+                REQUIRE(one.even == sums[i].even);
+                REQUIRE(one.odd == sums[i].odd);
+            }
+            contract_axis(table, k, at, c.weight, scaled.weight);
+            const unsigned char* block = table.row(k, row);
+            detail::Eight sum[2] = {detail::zero_eight(), detail::zero_eight()};
+            for (std::uint32_t first = 0; first < stride; first += 8) {
+                const std::uint32_t bits = table.bits(first);
+                const detail::Eight term =
+                    detail::times(detail::load_eight(c.weight + first),
+                                  detail::blend(block, bits, table.layout.row_bytes, at.weights));
+                float expected[8];
+                detail::store_eight(term, expected);
+                for (std::uint32_t r = 0; r < 8; ++r) REQUIRE(scaled.weight[first + r] == expected[r]);
+                detail::Eight& part = sum[first < table.even_stride() ? 0 : 1];
+                part = detail::plus(part, term);
+                block += bits;
+            }
+            REQUIRE(detail::sum_of_blend(table, k, row, at.weights, c.weight, -1) ==
+                    detail::sum_of(detail::plus(sum[0], detail::times(-1.0f, sum[1]))));
+        }
+    }
+}
+
 TEST_CASE("A pack's lobes are the factors' lobes, and integrate to 1", "[pack]") {
     const std::vector<unsigned char> bytes = small_pack();
     const OpenResult opened = open_pack(bytes.data(), bytes.size());

@@ -1,5 +1,6 @@
 // Rows of a table's factors, a block of eight components at a time: blends of four rows, and sums over the components.
-// Rests on pack.hpp's layout.
+// Each comes twice, for what the renderer is built for and for AVX2 (GCC and clang, x86-64), of the same bits. Rests on
+// pack.hpp's layout.
 #pragma once
 
 #include <cstdint>
@@ -176,23 +177,91 @@ MEDULLA_FN RowSums row_sums(const TableView& table, std::uint32_t k, std::uint32
     return {sum_of(sum[0]), sum_of(sum[1])};
 }
 
+// Rows are long enough that a branch to AVX2 pays where the processor has it. No fused products: the bits are the same.
 #if defined(MEDULLA_SSE2) && defined(__GNUC__) && !defined(__CUDACC__) && !defined(__HIPCC__)
 #define MEDULLA_ON_AVX2 __attribute__((target("avx2")))
-/// Numbers of a block; of 8 bits the upper bytes alone.
+#define MEDULLA_HOT_ON_AVX2 __attribute__((target("avx2"), always_inline)) inline
+
+/// Numbers of a block; of 8 bits the upper bytes alone, so that what they are multiplied with is scaled by
+/// unit_of<bits>.
 template <int bits>
-MEDULLA_ON_AVX2 __attribute__((always_inline)) inline __m256 wide_eight(const unsigned char* block) noexcept {
+MEDULLA_HOT_ON_AVX2 __m256 wide_eight(const unsigned char* block) noexcept {
     if constexpr (bits == 8)
         return _mm256_cvtepi32_ps(_mm256_cvtepi8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(block))));
     else
         return _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(words_of(block, Bits<bits>{})));
 }
+template <int bits>
+inline constexpr float unit_of = bits == 8 ? 256.0f : 1.0f;
+
+/// As sum_of adds.
+MEDULLA_HOT_ON_AVX2 float sum_of_wide(__m256 a) noexcept {
+    const __m128 x = _mm_add_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps(a, 1));
+    const __m128 y = _mm_add_ps(x, _mm_movehl_ps(x, x));
+    return _mm_cvtss_f32(_mm_add_ss(y, _mm_shuffle_ps(y, y, 1)));
+}
+
+/// blend, to the bit.
+template <int bits>
+MEDULLA_HOT_ON_AVX2 __m256 blend_wide(const unsigned char* block, std::size_t step,
+                                      const SplineWeights<float>& w) noexcept {
+    const __m256 a = _mm256_mul_ps(_mm256_set1_ps(w.w[0] * unit_of<bits>), wide_eight<bits>(block)),
+                 b = _mm256_mul_ps(_mm256_set1_ps(w.w[1] * unit_of<bits>), wide_eight<bits>(block + step)),
+                 c = _mm256_mul_ps(_mm256_set1_ps(w.w[2] * unit_of<bits>), wide_eight<bits>(block + 2 * step)),
+                 d = _mm256_mul_ps(_mm256_set1_ps(w.w[3] * unit_of<bits>), wide_eight<bits>(block + 3 * step));
+    return _mm256_add_ps(_mm256_add_ps(a, b), _mm256_add_ps(c, d));
+}
+MEDULLA_HOT_ON_AVX2 __m256 blend_wide(const unsigned char* block, std::uint32_t bits, std::size_t step,
+                                      const SplineWeights<float>& w) noexcept {
+    switch (bits) {
+        case 4:
+            return blend_wide<4>(block, step, w);
+        case 8:
+            return blend_wide<8>(block, step, w);
+        case 12:
+            return blend_wide<12>(block, step, w);
+        default:
+            return blend_wide<16>(block, step, w);
+    }
+}
+
+MEDULLA_ON_AVX2 inline void scale_by_blend_on_avx2(const TableView& table, const unsigned char* block,
+                                                   const SplineWeights<float>& w, const float* from,
+                                                   float* to) noexcept {
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
+        const std::uint32_t bits = table.bits(first);
+        const __m256 factor = blend_wide(block, bits, table.layout.row_bytes, w);
+        _mm256_storeu_ps(to + first, _mm256_mul_ps(_mm256_loadu_ps(from + first), factor));
+        block += bits;
+    }
+}
+
+MEDULLA_ON_AVX2 inline float sum_of_blend_on_avx2(const TableView& table, const unsigned char* block,
+                                                  const SplineWeights<float>& w, const float* weight,
+                                                  float sign) noexcept {
+    const std::uint32_t even = table.even_stride(), stride = table.layout.rank_stride;
+    __m256 sum = _mm256_setzero_ps(), odd = sum;
+    std::uint32_t first = 0;
+    for (; first < even; first += rank_multiple) {
+        const std::uint32_t bits = table.bits(first);
+        sum = _mm256_add_ps(
+            sum, _mm256_mul_ps(_mm256_loadu_ps(weight + first), blend_wide(block, bits, table.layout.row_bytes, w)));
+        block += bits;
+    }
+    for (; first < stride; first += rank_multiple) {
+        const std::uint32_t bits = table.bits(first);
+        odd = _mm256_add_ps(
+            odd, _mm256_mul_ps(_mm256_loadu_ps(weight + first), blend_wide(block, bits, table.layout.row_bytes, w)));
+        block += bits;
+    }
+    return sum_of_wide(_mm256_add_ps(sum, _mm256_mul_ps(_mm256_set1_ps(sign), odd)));
+}
 
 /// Adds w times a block of four rows, `step` bytes apart.
 template <int bits>
-MEDULLA_ON_AVX2 __attribute__((always_inline)) inline void add_four_blocks(const unsigned char* block, std::size_t step,
-                                                                           __m256 w, __m256& a, __m256& b, __m256& c,
-                                                                           __m256& d) noexcept {
-    if constexpr (bits == 8) w = _mm256_mul_ps(w, _mm256_set1_ps(256));
+MEDULLA_HOT_ON_AVX2 void add_four_blocks(const unsigned char* block, std::size_t step, __m256 w, __m256& a, __m256& b,
+                                         __m256& c, __m256& d) noexcept {
+    w = _mm256_mul_ps(w, _mm256_set1_ps(unit_of<bits>));
     a = _mm256_add_ps(a, _mm256_mul_ps(w, wide_eight<bits>(block)));
     b = _mm256_add_ps(b, _mm256_mul_ps(w, wide_eight<bits>(block + step)));
     c = _mm256_add_ps(c, _mm256_mul_ps(w, wide_eight<bits>(block + 2 * step)));
@@ -239,13 +308,46 @@ MEDULLA_ON_AVX2 inline void four_row_sums_on_avx2(const TableView& table, std::u
 }
 #endif
 
-/// row_sums of rows `row` .. `row + 3`: AVX2 where the processor has it, to the same bits.
+/// row_sums of rows `row` .. `row + 3`: on AVX2 where the processor has it, to the same bits, as the two below.
 MEDULLA_FN void four_row_sums(const TableView& table, std::uint32_t k, std::uint32_t row, const float* weight,
                               RowSums (&sums)[4]) noexcept {
 #if defined(MEDULLA_ON_AVX2)
     if (__builtin_cpu_supports("avx2")) return four_row_sums_on_avx2(table, k, row, weight, sums);
 #endif
     for (std::uint32_t i = 0; i < 4; ++i) sums[i] = row_sums(table, k, row + i, weight);
+}
+
+/// to[r] = from[r] * (blend of four rows of axis k from `row` on)[r].
+MEDULLA_FN void scale_by_blend(const TableView& table, std::uint32_t k, std::uint32_t row,
+                               const SplineWeights<float>& w, const float* from, float* to) noexcept {
+    const unsigned char* block = table.row(k, row);
+#if defined(MEDULLA_ON_AVX2)
+    if (__builtin_cpu_supports("avx2")) return scale_by_blend_on_avx2(table, block, w, from, to);
+#endif
+    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
+        const std::uint32_t bits = table.bits(first);
+        store_eight(times(load_eight(from + first), blend(block, bits, table.layout.row_bytes, w)), to + first);
+        block += bits;
+    }
+}
+
+/// Sum over r of weight[r] * (blend of four rows of axis k from `row` on)[r], odd components times `sign`.
+MEDULLA_FN float sum_of_blend(const TableView& table, std::uint32_t k, std::uint32_t row, const SplineWeights<float>& w,
+                              const float* weight, float sign) noexcept {
+    const unsigned char* block = table.row(k, row);
+#if defined(MEDULLA_ON_AVX2)
+    if (__builtin_cpu_supports("avx2")) return sum_of_blend_on_avx2(table, block, w, weight, sign);
+#endif
+    Eight sum[2] = {zero_eight(), zero_eight()};
+    const auto add = [&](Eight& part, std::uint32_t first) {
+        const std::uint32_t bits = table.bits(first);
+        part = plus(part, times(load_eight(weight + first), blend(block, bits, table.layout.row_bytes, w)));
+        block += bits;
+    };
+    const std::uint32_t even = table.even_stride(), stride = table.layout.rank_stride;
+    for (std::uint32_t first = 0; first < even; first += rank_multiple) add(sum[0], first);
+    for (std::uint32_t first = even; first < stride; first += rank_multiple) add(sum[1], first);
+    return sum_of(plus(sum[0], times(sign, sum[1])));
 }
 
 }  // namespace detail

@@ -2,17 +2,18 @@
 // it there adds what it dips. Rests on blocks.hpp.
 #pragma once
 
+#include <cmath>
+
 #include "medulla/blocks.hpp"
 
 namespace medulla {
 
 namespace detail {
 
-/// Integral of max(0, -f) over one span; f the spline with these four coefficients there. Eighths of the span tell the
-/// signs of f apart; the root between two signs is bisected, and Simpson's rule is exact for a cubic.
+/// Integral of max(0, -f) over one span; f the spline with these four coefficients there. Between its ends and where it
+/// is stationary the cubic is monotone: a root is bisected, and Simpson's rule is exact.
 MEDULLA_FN float dip(const AxisView<float>& axis, std::uint32_t span, const float* c) noexcept {
     if (c[0] >= 0 && c[1] >= 0 && c[2] >= 0 && c[3] >= 0) return 0;  // then f is too
-    constexpr int parts = 8, halvings = 12;
     const float low = axis.breakpoint(std::int32_t(span)), width = axis.breakpoint(std::int32_t(span) + 1) - low;
     float at[4];  // f at thirds of the span, which make its cubic by Newton's forward differences
     for (int i = 0; i < 4; ++i) {
@@ -23,23 +24,31 @@ MEDULLA_FN float dip(const AxisView<float>& axis, std::uint32_t span, const floa
                 p2 = 4.5f * (2 * at[0] - 5 * at[1] + 4 * at[2] - at[3]),
                 p3 = 4.5f * (3 * (at[1] - at[2]) + at[3] - at[0]);
     const auto f = [&](float t) { return at[0] + t * (p1 + t * (p2 + t * p3)); };  // t in [0, 1]
-    float sum = 0, a = 0, at_a = f(0);
-    for (int i = 1; i <= parts; ++i) {
-        const float b = float(i) / parts, at_b = f(b);
-        if (at_a < 0 || at_b < 0) {
-            float root = at_a < 0 ? b : a;  // the end of the negative stretch that is not an end of the part
-            if (at_a * at_b < 0) {
-                float negative = at_a < 0 ? a : b, positive = at_a < 0 ? b : a;
-                for (int k = 0; k < halvings; ++k) {
-                    const float middle = 0.5f * (negative + positive);
-                    (f(middle) < 0 ? negative : positive) = middle;
-                }
-                root = negative;
+    float end[4] = {0, 1, 1, 1};                                                   // of the monotone parts, ascending
+    int parts = 1;
+    const float discriminant = p2 * p2 - 3 * p1 * p3;
+    if (discriminant > 0) {
+        const float q = -(p2 + (p2 < 0 ? -std::sqrt(discriminant) : std::sqrt(discriminant)));
+        const float s = q / (3 * p3), t = p1 / q;
+        const float ascending[2] = {s < t ? s : t, s < t ? t : s};
+        for (const float x : ascending)
+            if (x > end[parts - 1] && x < 1) end[parts++] = x;
+        end[parts] = 1;
+    }
+    float sum = 0;
+    for (int i = 0; i < parts; ++i) {
+        const float a = end[i], b = end[i + 1], at_a = f(a), at_b = f(b);
+        if (!(at_a < 0 || at_b < 0)) continue;
+        float negative = at_a < 0 ? a : b, positive = at_a < 0 ? b : a;
+        if (at_a > 0 || at_b > 0)
+            for (int k = 0; k < 12; ++k) {  // f is nearly 0 there: what is left is second order in 2^-12
+                const float middle = 0.5f * (negative + positive);
+                (f(middle) < 0 ? negative : positive) = middle;
             }
-            const float from = at_a < 0 ? a : root, to = at_a < 0 ? root : b;
-            sum -= (to - from) / 6 * (f(from) + 4 * f(0.5f * (from + to)) + f(to));
-        }
-        a = b, at_a = at_b;
+        else
+            negative = positive;
+        const float from = at_a < 0 ? a : negative, to = at_a < 0 ? negative : b;
+        sum -= (to - from) / 6 * (f(from) + 4 * f(0.5f * (from + to)) + f(to));
     }
     return sum > 0 ? sum * width : 0;
 }
@@ -77,8 +86,7 @@ MEDULLA_FN float dips(const AxisView<float>& axis, At&& at) noexcept {
     return sum;
 }
 
-/// The same of a table's lobe with these weights, from the whole exit factor: to float precision but for dips narrower
-/// than an eighth of a span.
+/// The same of a table's lobe with these weights, from the whole exit factor, to float precision.
 MEDULLA_FN float dips(const TableView& table, const float* weight) noexcept {
     const AxisView<float> axis = table.axis(table.parameter_axes());
     // Of either half the four coefficients of the rows that came last, behind the three before them.

@@ -84,13 +84,7 @@ MEDULLA_HOT AxisPoint axis_point(const TableView& table, std::uint32_t k, const 
 /// to[r] = from[r] * (factor r of axis k at the point).
 MEDULLA_HOT void contract_axis(const TableView& table, std::uint32_t k, const AxisPoint& at, const float* from,
                                float* to) noexcept {
-    const unsigned char* block = table.row(k, at.span);
-    for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
-        const std::uint32_t bits = table.bits(first);
-        const detail::Eight factor = detail::blend(block, bits, table.layout.row_bytes, at.weights);
-        detail::store_eight(detail::times(detail::load_eight(from + first), factor), to + first);
-        block += bits;
-    }
+    detail::scale_by_blend(table, k, at.span, at.weights, from, to);
 }
 /// to[r] = from[r] * (row `row` of axis k)[r].
 MEDULLA_FN void scale_by_row(const TableView& table, std::uint32_t k, std::uint32_t row, const float* from,
@@ -180,18 +174,8 @@ MEDULLA_FN Contraction contract(const TableView& table, const LobeQuery& query) 
 
 /// Density per radian at an exit direction, before anything is held to >= 0.
 MEDULLA_HOT float signed_lobe(const TableView& table, const Contraction& contraction, const ExitPoint& to) noexcept {
-    const unsigned char* block = table.row(table.parameter_axes(), to.at.span);
-    const std::uint32_t stride = table.layout.rank_stride, even = table.even_stride();
-    detail::Eight sum[2] = {detail::zero_eight(), detail::zero_eight()};
-    const auto add = [&](detail::Eight& part, std::uint32_t first) {
-        const std::uint32_t bits = table.bits(first);
-        const detail::Eight factor = detail::blend(block, bits, table.layout.row_bytes, to.at.weights);
-        part = detail::plus(part, detail::times(detail::load_eight(contraction.weight + first), factor));
-        block += bits;
-    };
-    for (std::uint32_t first = 0; first < even; first += rank_multiple) add(sum[0], first);
-    for (std::uint32_t first = even; first < stride; first += rank_multiple) add(sum[1], first);
-    return detail::sum_of(detail::plus(sum[0], detail::times(to.sign, sum[1]))) * contraction.inverse_integral;
+    return detail::sum_of_blend(table, table.parameter_axes(), to.at.span, to.at.weights, contraction.weight, to.sign) *
+           contraction.inverse_integral;
 }
 /// The same at exit direction y [radians] of a table with an exit axis.
 MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contraction, float y) noexcept {

@@ -121,6 +121,25 @@ void bench_lookups(const PackView& pack, const std::string& label, UnfoldedTable
            "ns", std::sqrt(error / norm));
 }
 
+/// All axes of a table at once, without and with what a lobe's dips below 0 hold.
+void bench_contract(const PackView& pack) {
+    const auto q = queries(512);
+    const auto time = [&](const TableView& view, Contraction (*f)(const TableView&, const LobeQuery&) noexcept) {
+        return nanoseconds(int(q.size()), [&] {
+            float sum = 0;
+            for (const Query& x : q)
+                sum += f(view, {2.2f + 0.1f * x.theta_i, 0.4f, std::abs(x.h), std::abs(x.theta_i), 0}).inverse_integral;
+            sink = sum;
+        });
+    };
+    for (const auto& [kind, name] :
+         {std::pair(TableKind::azimuthal, "C^N"), std::pair(TableKind::longitudinal_back, "C^M back"),
+          std::pair(TableKind::longitudinal_forward, "C^M forward")}) {
+        report(std::string("contract_signed, ") + name, time(pack[kind], contract_signed), "ns");
+        report(std::string("contract, ") + name, time(pack[kind], contract), "ns");
+    }
+}
+
 /// All five lobes in RGB; errors against the double-precision twin, which reads the factors.
 void bench_near(const FurFibre<3>& fibre, const std::string& how) {
     const auto q = queries(512);
@@ -487,7 +506,10 @@ int main(int argc, char** argv) {
     bench_lookups(opened.pack, pack_file.empty() ? " (the default pack)" : " (the pack)", tables[0]);
     FurFibre<3> fibre;
     prepare(parameters_of<3>(fur_presets[0]), opened.pack, fibre);
+    bench_contract(opened.pack);
     bench_near(fibre, "factors");
+    fibre.exact_energy = false;
+    bench_near(fibre, "factors, dips not counted");
     report("unfolding a material", nanoseconds(1, [&] { sink = unfold(fibre, tables[0]) ? 1.0f : 0.0f; }) / 1000, "us");
     bench_near(fibre, "unfolded");
     bench_unfolding(opened.pack, *std::make_unique<UnfoldedTables>());

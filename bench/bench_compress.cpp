@@ -25,7 +25,7 @@ using namespace medulla::tables;
 namespace {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-constexpr double bytes_per_number = 1.5;  // every method gets the pack's 12 bits
+constexpr double bytes_per_number = 1.5;  // of the other methods: 12 bits
 
 double cpu_now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
@@ -130,7 +130,7 @@ double kind_bytes(const TableReport& report, const std::vector<unsigned char>& p
     const TableView& table = opened.pack[report.kind];
     double bytes = 8.0 * table.layout.rank_stride;
     for (std::uint32_t k = 0; k < table.layout.axis_count; ++k)
-        bytes += (table.layout.axes[k].spans + 3.0) * static_cast<double>(row_bytes(table.layout.rank_stride));
+        bytes += (table.layout.axes[k].spans + 3.0) * static_cast<double>(table.layout.row_bytes);
     return bytes;
 }
 

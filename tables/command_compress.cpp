@@ -27,13 +27,14 @@ const char* mirror_name(Mirror mirror) {
     return mirror == Mirror::none ? "whole" : (mirror == Mirror::even ? "even" : "odd");
 }
 
-/// Whether fit_error is the pack's.
+/// Whether fit_error is of normalised lobes.
 bool is_nonnegative(const TableReport& report) { return report.parts[0].solve.solver == std::string("nonnegative"); }
 
 nlohmann::ordered_json report_json(const TableReport& report) {
     nlohmann::ordered_json json = {
         {is_nonnegative(report) ? "relative_l2_in_pack" : "relative_l2_of_factors", report.fit_error},
         {"relative_l2_of_exit_spline", report.exit_error},
+        {"relative_l2_of_rounding", report.rounding},
         {"relative_l2_of_input_noise", report.noise}};
     for (const PartReport& part : report.parts)
         json["parts"][mirror_name(part.mirror)] = {{"rank", part.rank},
@@ -105,9 +106,9 @@ void run_compress(const CompressWords& words) {
         return;
     }
     for (const TableReport& report : result.tables) {
-        fmt::print("{}: {} {:.3e} relative L2 (exit spline {:.1e}, noise of the table {:.1e})\n",
+        fmt::print("{}: {} {:.3e} relative L2 (exit spline {:.1e}), rounding {:.1e}, noise of the table {:.1e}\n",
                    medulla::tables::name_of(report.kind), is_nonnegative(report) ? "in the pack" : "factors",
-                   report.fit_error, report.exit_error, report.noise);
+                   report.fit_error, report.exit_error, report.rounding, report.noise);
         for (const PartReport& part : report.parts)
             fmt::print("  {:<8} rank {:>3}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
                        mirror_name(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
@@ -230,8 +231,7 @@ void add_compress(CLI::App& app, Action& action) {
                              "stores them padded with zeros to a multiple of 8, so that 4 take the bytes of 8")
                 ->check(CLI::Range(1, static_cast<int>(max_rank / 2)));
             size->add_option("--max-error", words.max_error,
-                             "smallest pack whose factors keep this relative L2 (with --nonnegative: that keeps it); "
-                             "rounding to 12 bits may add a few per cent of it")
+                             "smallest pack that keeps this relative L2, rounding included")
                 ->check(CLI::PositiveNumber);
             size->add_option("--max-bytes", words.max_bytes, "least error within this many bytes")
                 ->check(CLI::PositiveNumber);

@@ -5,20 +5,31 @@
 #include <cmath>
 #include <ctime>
 #include <nlohmann/json.hpp>
+#include <tuple>
 #include <utility>
 
 #include "tables/error.hpp"
+#include "tables/rounding.hpp"
 
 namespace medulla::tables {
 namespace {
 
 constexpr int rank_step = static_cast<int>(rank_multiple), greatest_rank = static_cast<int>(max_rank);
-/// Of the energies: more rank is only rounding. The slab's have three small axes, the disc's with absorption four.
-int energy_rank(const Part& part) { return part.kind == TableKind::survival ? 48 : 32; }
+/// Bits that a number takes on average where rounding is in balance with components left out, before solves say better,
+/// and where more components would not pay.
+constexpr double usual_bits = 9, ample_bits = 12.5;
+/// Of the energies: more rank is only rounding. The slab's have three small axes, the disc's with absorption four. A
+/// small pack spends at most a 17th of its bytes on them.
+int energy_rank(const Part& part, const CompressOptions& options) {
+    const int most = part.kind == TableKind::survival ? 48 : 32;
+    if (!options.max_bytes) return most;
+    const double room = static_cast<double>(*options.max_bytes) / 17 / part.component_bytes(usual_bits);
+    return std::clamp(static_cast<int>(room / rank_step) * rank_step, rank_step, most);
+}
 /// Of the solves that say how hard each part is.
 constexpr int pilot_rank = 32;
-/// Room kept for the provenance text when a pack must fit into a number of bytes.
-constexpr std::size_t text_room = 2048;
+/// Room for the provenance text while components are shared out; what it does not take goes to bits.
+constexpr std::size_t text_room = 800;
 /// Errors of these tables fall about as rank^-2 (docs/accuracy.md), which is all that sharing out components needs.
 constexpr double decay = 2;
 
@@ -108,10 +119,10 @@ std::vector<std::pair<std::size_t, std::size_t>> kinds_of(const Solves& solves) 
 }
 
 /// Real-valued ranks that minimise the sum of squared errors for a price of `lambda` a byte: with errors falling as
-/// rank^-decay, rank^(2 decay + 1) is proportional to error^2 / (bytes of a component).
+/// rank^-decay, rank^(2 decay + 1) is proportional to error^2 / (bytes of a component, about).
 double share_of(const Solve& solve, double lambda) {
     const double unit = solve.error * std::pow(solve.rank, decay);
-    return std::pow(lambda * unit * unit / static_cast<double>(solve.part->component_bytes()), 1 / (2 * decay + 1));
+    return std::pow(lambda * unit * unit / solve.part->component_bytes(usual_bits), 1 / (2 * decay + 1));
 }
 
 /// Greatest lambda for which fits(lambda), by bisection of its logarithm; `fits` is monotone and true for little.
@@ -133,20 +144,24 @@ PackedTable pack_kind(const Solves& solves, std::size_t first, std::size_t last,
     return join(parts, models, range);
 }
 
-/// Bytes of a pack with these ranks: laid out with factors of zeros.
-std::size_t pack_bytes(Solves solves) {
-    for (Solve& solve : solves) {
-        solve.result.model.weights = Eigen::VectorXd::Zero(solve.rank);
-        solve.result.model.factors.clear();
-        for (const std::size_t n : solve.part->values.shape)
-            solve.result.model.factors.push_back(Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), solve.rank));
-    }
+/// Bytes of a pack with these ranks and so many bits a number on average.
+std::size_t pack_bytes(const Solves& solves, double bits) {
     std::vector<PackedTable> tables;
-    for (const auto& [first, last] : kinds_of(solves)) tables.push_back(pack_kind(solves, first, last, {0, 0}));
-    return write_pack(tables, std::string(text_room, ' ')).size();
+    double more = 0;  // than 8 bits
+    for (const auto& [first, last] : kinds_of(solves)) {
+        const Part& part = *solves[first].part;
+        int rank = 0;
+        for (std::size_t i = first; i < last; ++i) rank += solves[i].rank * part.copies();
+        PackedTable table{part.kind, part.axes, Eigen::VectorXd::Zero(rank), solves[first].rank, 0, 0};
+        for (PackedAxis& axis : table.axes) axis.coefficients = Eigen::MatrixXd::Zero(axis.spline.size(), rank);
+        table.bits.assign(table.stride() / rank_multiple, 8);
+        more += (bits / 8 - 1) * static_cast<double>(table.rows() * table.stride());
+        tables.push_back(std::move(table));
+    }
+    return write_pack(tables, std::string(text_room, ' ')).size() + static_cast<std::size_t>(more);
 }
 
-void share_bytes(Solves& solves, std::size_t bytes) {
+void share_bytes(Solves& solves, std::size_t bytes, double bits) {
     const Solves pilot = solves;
     const auto set = [&](double lambda) {
         for (std::size_t i = 0; i < solves.size(); ++i) {
@@ -157,7 +172,7 @@ void share_bytes(Solves& solves, std::size_t bytes) {
     };
     const auto fits = [&](double lambda) {
         set(lambda);
-        return pack_bytes(solves) <= bytes;
+        return pack_bytes(solves, bits) <= bytes;
     };
     if (!fits(0)) return;  // the least ranks there are; compress() says whether their pack is too large
     set(greatest(fits));
@@ -169,15 +184,28 @@ void share_bytes(Solves& solves, std::size_t bytes) {
             const int step = rank_step * solves[i].part->copies();
             if (!solves[i].part->lobes() || stored_rank(solves, solves[i].part->kind) + step > greatest_rank) continue;
             const double now = pilot[i].expected(solves[i].rank), then = pilot[i].expected(solves[i].rank + rank_step);
-            const double gain = (now * now - then * then) / static_cast<double>(solves[i].part->component_bytes());
+            const double gain = (now * now - then * then) / solves[i].part->component_bytes(usual_bits);
             if (gain <= most) continue;
             solves[i].rank += rank_step;
-            if (pack_bytes(solves) <= bytes) best = i, most = gain;
+            if (pack_bytes(solves, bits) <= bytes) best = i, most = gain;
             solves[i].rank -= rank_step;
         }
         if (best == solves.size()) return;
         solves[best].rank += rank_step;
     }
+}
+
+/// Solves of great ranks take seconds, and a hundred steps do not bring them to their optimum.
+bool too_large(const Solves& solves, const CompressOptions& options) {
+    return !options.max_sweeps &&
+           std::any_of(solves.begin(), solves.end(), [](const Solve& solve) { return solve.rank > 96; });
+}
+
+/// By what the pilots say; where solves would be too large, bytes go to bits.
+void share_first(Solves& solves, const CompressOptions& options) {
+    const Solves pilots = solves;
+    share_bytes(solves, *options.max_bytes, usual_bits);
+    if (too_large(solves, options)) share_bytes(solves = pilots, *options.max_bytes, ample_bits);
 }
 
 /// Rows of exit splines that are far finer than a kind's expected error are bytes that more components use better:
@@ -216,24 +244,59 @@ double kind_error(const Solves& solves, std::size_t first, std::size_t last) {
     return std::sqrt(sum);
 }
 
+/// The solves as tables of a pack, each block as wide as the options say; lobes within max_bytes take what is left of
+/// it.
+std::vector<PackedTable> pack_tables(const Solves& solves, const CompressOptions& options, std::size_t text_bytes) {
+    std::vector<PackedTable> tables;
+    for (const auto& [first, last] : kinds_of(solves)) tables.push_back(pack_kind(solves, first, last, {0, 0}));
+    std::vector<PackedTable*> lobes;
+    for (std::size_t i = 0; i < tables.size(); ++i) {
+        const auto [first, last] = kinds_of(solves)[i];
+        const double error = std::pow(kind_error(solves, first, last), 2);
+        if (!is_lobe(tables[i].kind) || (!options.max_error && !options.max_bytes))
+            set_bits({&tables[i]}, error / 16);  // adds 3 %
+        else if (options.max_error)
+            set_bits({&tables[i]}, std::pow(*options.max_error, 2) - error);
+        else
+            lobes.push_back(&tables[i]), set_bits({&tables[i]}, INFINITY);
+    }
+    if (!options.max_bytes) return tables;
+    const std::size_t least = write_pack(tables, std::string(text_bytes, ' ')).size();
+    if (least < *options.max_bytes) set_bits(lobes, 0, *options.max_bytes - least);
+    return tables;
+}
+
+/// Squared errors of a pack's lobes.
+struct Balance {
+    double components = 0, rounding = 0;  ///< what components left out and what rounding makes of them
+    double bits = 0;                      ///< of a number on average
+};
+Balance balance_of(const Solves& solves, const CompressOptions& options) {
+    const std::vector<PackedTable> tables = pack_tables(solves, options, text_room);
+    Balance sum;
+    std::vector<const PackedTable*> lobes;
+    for (std::size_t i = 0; i < tables.size(); ++i) {
+        if (!is_lobe(tables[i].kind)) continue;
+        const auto [first, last] = kinds_of(solves)[i];
+        sum.components += std::pow(kind_error(solves, first, last), 2);
+        sum.rounding += rounding_error(tables[i]);
+        lobes.push_back(&tables[i]);
+    }
+    sum.bits = mean_bits(lobes);
+    return sum;
+}
+
 /// Shares out again with what the solves at these ranks say in the pilots' place, as long as that lowers the errors.
-/// Solves of great ranks take seconds, and steps of the format matter less there: those only where more sweeps are
-/// asked.
-void share_again(Solves& solves, std::size_t bytes, const CompressOptions& options, const Source* tables) {
-    const auto total = [](const Solves& all) {
-        double sum = 0;
-        for (const auto& [first, last] : kinds_of(all))
-            if (all[first].part->lobes()) sum += std::pow(kind_error(all, first, last), 2);
-        return sum;
-    };
-    for (int tries = 0; tries < 4; ++tries) {
-        for (const Solve& solve : solves)
-            if (solve.rank > 96 && !options.max_sweeps) return;
+void share_again(Solves& solves, const CompressOptions& options, const Source* tables) {
+    Balance now = balance_of(solves, options);
+    for (int tries = 0; tries < 4 && !too_large(solves, options); ++tries) {
         Solves next = solves;
-        share_bytes(next, bytes);
+        const double excess = now.rounding / (balanced_rounding * now.components);
+        share_bytes(next, *options.max_bytes, now.bits + 0.5 * std::log2(excess));
         run(next, options, false, tables);
-        if (!(total(next) < total(solves))) return;
-        solves = std::move(next);
+        const Balance then = balance_of(next, options);
+        if (!(then.components + then.rounding < now.components + now.rounding)) return;
+        solves = std::move(next), now = then;
     }
 }
 
@@ -242,7 +305,7 @@ void share_again(Solves& solves, std::size_t bytes, const CompressOptions& optio
 void solve_to(Solves& solves, double error, const CompressOptions& options, const Source* tables) {
     for (const auto& [first, last] : kinds_of(solves)) {
         if (!solves[first].part->lobes()) {
-            solves[first].rank = energy_rank(*solves[first].part);
+            solves[first].rank = energy_rank(*solves[first].part, options);
             continue;
         }
         double spline = 0;
@@ -361,31 +424,35 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
     Solves solves;
     const bool searched = options.max_error || options.max_bytes;
     const int rank = searched ? pilot_rank : options.rank;
-    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank(part)});
+    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank(part, options)});
     std::unique_ptr<Source> source;
     if (options.solver == tensor::Solver::nonnegative) source = table_source(tables);
     if (searched) run(solves, options, true, source.get());
-    if (options.max_error) solve_to(solves, *options.max_error, options, source.get());
+    // Rounding takes its share of the error.
+    if (options.max_error)
+        solve_to(solves, *options.max_error / std::sqrt(1 + balanced_rounding), options, source.get());
     if (options.max_bytes) {
         const Solves pilots = solves;
-        share_bytes(solves, *options.max_bytes);
+        share_first(solves, options);
         if (options.solver != tensor::Solver::nonnegative) {
             const Solves shared = std::exchange(solves, pilots);
             if (coarsen_exits(tables, options.spans, parts, shared, solves))
-                share_bytes(solves, *options.max_bytes);
+                share_first(solves, options);
             else
                 solves = shared;
         }
     }
     run(solves, options, false, source.get());
-    if (options.max_bytes) share_again(solves, *options.max_bytes, options, source.get());
+    if (options.max_bytes) share_again(solves, options, source.get());
     CompressResult result;
-    std::vector<PackedTable> packed;
-    for (const auto& [first, last] : kinds_of(solves)) {
-        packed.push_back(pack_kind(solves, first, last, range_of(*solves[first].part, tables)));
-        result.tables.push_back(report_of(solves, first, last, tables));
+    for (const auto& [first, last] : kinds_of(solves)) result.tables.push_back(report_of(solves, first, last, tables));
+    const std::string text = provenance(tables, options, input, result.tables);
+    std::vector<PackedTable> packed = pack_tables(solves, options, text.size());
+    for (std::size_t i = 0; i < packed.size(); ++i) {
+        std::tie(packed[i].low, packed[i].high) = range_of(*solves[kinds_of(solves)[i].first].part, tables);
+        result.tables[i].rounding = std::sqrt(rounding_error(packed[i]));
     }
-    result.pack = write_pack(packed, provenance(tables, options, input, result.tables));
+    result.pack = write_pack(packed, text);
     if (options.max_bytes && result.pack.size() > *options.max_bytes)
         throw Error("--max-bytes: expected at least {} for these tables, found {}", result.pack.size(),
                     *options.max_bytes);

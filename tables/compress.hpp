@@ -36,8 +36,9 @@ struct TableReport {
     TableKind kind;
     std::vector<PartReport> parts;
     /// Relative L2 against the table: of the factors before rounding and normalisation; of non-negative ones, which
-    /// normalisation brings much nearer, in the pack.
+    /// normalisation brings much nearer, in a pack of 16 bits.
     double fit_error = 0;
+    double rounding = 0;    ///< relative L2 that rounding to the pack's bits adds, in squares
     double exit_error = 0;  ///< part of it that the exit spline leaves
     double noise = 0;       ///< relative L2 standard error of the table itself
 };

@@ -44,14 +44,33 @@ int @_even_stride(int table) { return (@_whole(table + 1) + 7) / 8 * 8; }
 bool @_has_exit(int table) { return @_whole(table + 6) != 0; }
 int @_parameters(int table) { return @_whole(table + 4) - (@_has_exit(table) ? 1 : 0); }
 
-// Four of eight 12-bit numbers in three words: the upper eight bits of each, then the lower four.
-vec4 @_four(int word, int which) {
+// Of a table's rows, all words: their length, and how many bits the numbers of a block of eight components keep. A block
+// of that many bits takes as many bytes.
+int @_row_words(int table) { return @_whole(table + 9) / 4; }
+int @_bits(int table, int block) { return int(@_word(table + 10 + block / 4) >> uint(8 * (block % 4))) & 255; }
+
+// Four of a block's eight numbers of 16 bits, of which it keeps the upper ones: the upper eight bits of each, then the
+// next four or eight; of four bits only those.
+vec4 @_four(int word, int bits, int which) {
+    if (bits == 4) {
+        uint halves = @_word(word) >> uint(16 * which);
+        return 4096.0f * vec4(float(int(halves << 28u) >> 28), float(int(halves << 24u) >> 28),
+                              float(int(halves << 20u) >> 28), float(int(halves << 16u) >> 28));
+    }
     uint upper = @_word(word + which);
-    uint lower = @_word(word + 2) >> uint(16 * which);
-    return vec4(float((int(upper << 24u) >> 24) * 16 + int(lower & 15u)),
-                float((int(upper << 16u) >> 24) * 16 + int((lower >> 4u) & 15u)),
-                float((int(upper << 8u) >> 24) * 16 + int((lower >> 8u) & 15u)),
-                float((int(upper) >> 24) * 16 + int((lower >> 12u) & 15u)));
+    vec4 value = 256.0f * vec4(float(int(upper << 24u) >> 24), float(int(upper << 16u) >> 24),
+                               float(int(upper << 8u) >> 24), float(int(upper) >> 24));
+    if (bits == 12) {
+        uint lower = @_word(word + 2) >> uint(16 * which);
+        value = value + 16.0f * vec4(float(lower & 15u), float((lower >> 4u) & 15u), float((lower >> 8u) & 15u),
+                                     float((lower >> 12u) & 15u));
+    }
+    if (bits == 16) {
+        uint lower = @_word(word + 2 + which);
+        value = value + vec4(float(lower & 255u), float((lower >> 8u) & 255u), float((lower >> 16u) & 255u),
+                             float(lower >> 24u));
+    }
+    return value;
 }
 
 // The variable of an axis's spline.
@@ -70,7 +89,7 @@ struct @_point_t {
 };
 
 @_point_t @_point(int table, int k, float x) {
-    int axis = table + 9 + 8 * k;
+    int axis = table + 26 + 8 * k;
     int spans = @_whole(axis + 2);
     int knots = @_whole(axis + 3) / 4 + 8;  // behind two ghosts; a knot is four words
     float c = @_coordinate(@_whole(axis), x);
@@ -89,16 +108,17 @@ struct @_point_t {
     float a = n0 * @_float(knot - 2), b = n1 * @_float(knot + 2);
     float m0 = r1 * a, m1 = l2 * a + r2 * b, m2 = l1 * b;
     float d = m0 * @_float(knot - 5), e = m1 * @_float(knot - 1), f = m2 * @_float(knot + 3);
-    int words = @_stride(table) / 8 * 3;
+    int words = @_row_words(table);
     vec4 weight = vec4(r1 * d, l3 * d + r2 * e, l2 * e + r3 * f, l1 * f);
     return @_point_t(@_whole(axis + 4) / 4 + span * words, words, weight);
 }
 
-// Spline of four components: `vector` counts them by four.
-vec4 @_blend(@_point_t at, int vector) {
-    int word = at.row + vector / 2 * 3, which = vector % 2;
-    return (at.weight.x * @_four(word, which) + at.weight.y * @_four(word + at.step, which)) +
-           (at.weight.z * @_four(word + 2 * at.step, which) + at.weight.w * @_four(word + 3 * at.step, which));
+// Spline of four components of the block that begins `word` words into a row.
+vec4 @_blend(@_point_t at, int word, int bits, int which) {
+    int first = at.row + word;
+    return (at.weight.x * @_four(first, bits, which) + at.weight.y * @_four(first + at.step, bits, which)) +
+           (at.weight.z * @_four(first + 2 * at.step, bits, which) +
+            at.weight.w * @_four(first + 3 * at.step, bits, which));
 }
 
 float @_sum(vec4 low, vec4 high) {
@@ -106,19 +126,25 @@ float @_sum(vec4 low, vec4 high) {
     return (both.x + both.z) + (both.y + both.w);
 }
 
-// Contracts the parameter axes of a table.
+// Contracts the parameter axes of a table, as the runtime's contract_signed: counting a lobe's dips below 0 would read
+// the whole exit factor.
 @_contraction_t @_contract(int table, @_query_t at) {
     @_contraction_t result;
     int scales = @_whole(table + 5) / 4, vectors = @_stride(table) / 4;
     for (int v = 0; v < vectors; ++v) result.weight[v] = @_floats(scales + 4 * v);
     for (int k = 0; k < @_parameters(table); ++k) {
-        int quantity = @_whole(table + 9 + 8 * k);
+        int quantity = @_whole(table + 26 + 8 * k);
         float x = at.inclined;
         if (quantity == @_SIGMA) x = at.sigma;
         if (quantity == @_G) x = at.g;
         if (quantity == @_ABSORPTION) x = at.absorption;
         @_point_t on = @_point(table, k, x);
-        for (int v = 0; v < vectors; ++v) result.weight[v] = result.weight[v] * @_blend(on, v);
+        for (int v = 0, word = 0; v < vectors; v += 2) {
+            int bits = @_bits(table, v / 2);
+            result.weight[v] = result.weight[v] * @_blend(on, word, bits, 0);
+            result.weight[v + 1] = result.weight[v + 1] * @_blend(on, word, bits, 1);
+            word += bits / 4;
+        }
     }
     result.inverse_integral = 1.0f;
     if (@_has_exit(table)) {
@@ -137,19 +163,24 @@ float @_sum(vec4 low, vec4 high) {
 // Density per radian at exit direction y [radians], >= 0, with integral 1 but for what holding it at 0 adds.
 float @_lobe(int table, @_contraction_t contraction, float y) {
     int k = @_parameters(table);
-    if (@_whole(table + 9 + 8 * k) == @_PHI && !(y >= -3.14159274f && y <= 3.14159274f))
+    if (@_whole(table + 26 + 8 * k) == @_PHI && !(y >= -3.14159274f && y <= 3.14159274f))
         y = y - floor((y + 3.14159274f) * 0.159154937f) * 6.28318548f;
     @_point_t to = @_point(table, k, y < 0.0f ? -y : y);
     float sign_of_odd = y < 0.0f ? -1.0f : 1.0f;
     vec4 even_low = vec4(0.0f, 0.0f, 0.0f, 0.0f), even_high = even_low, odd_low = even_low, odd_high = even_low;
     int even = @_even_stride(table) / 4, vectors = @_stride(table) / 4;
-    for (int v = 0; v < even; v += 2) {
-        even_low = even_low + contraction.weight[v] * @_blend(to, v);
-        even_high = even_high + contraction.weight[v + 1] * @_blend(to, v + 1);
-    }
-    for (int v = even; v < vectors; v += 2) {
-        odd_low = odd_low + contraction.weight[v] * @_blend(to, v);
-        odd_high = odd_high + contraction.weight[v + 1] * @_blend(to, v + 1);
+    for (int v = 0, word = 0; v < vectors; v += 2) {
+        int bits = @_bits(table, v / 2);
+        vec4 low = contraction.weight[v] * @_blend(to, word, bits, 0);
+        vec4 high = contraction.weight[v + 1] * @_blend(to, word, bits, 1);
+        if (v < even) {
+            even_low = even_low + low;
+            even_high = even_high + high;
+        } else {
+            odd_low = odd_low + low;
+            odd_high = odd_high + high;
+        }
+        word += bits / 4;
     }
     float value =
         @_sum(even_low + sign_of_odd * odd_low, even_high + sign_of_odd * odd_high) * contraction.inverse_integral;

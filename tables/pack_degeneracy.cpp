@@ -14,7 +14,7 @@ Eigen::RowVectorXd factors_at(const TableView& table, std::uint32_t k, float x) 
     Eigen::RowVectorXd values = Eigen::RowVectorXd::Zero(rank);
     for (std::uint32_t j = 0; j < 4; ++j)
         for (std::uint32_t r = 0; r < rank; ++r)
-            values[r] += static_cast<double>(weights.w[j]) * load_number(table.row(k, cell.span + j), r);
+            values[r] += static_cast<double>(weights.w[j]) * table.number(k, cell.span + j, r);
     return values;
 }
 

@@ -8,12 +8,12 @@
 namespace medulla::tables {
 namespace {
 
-/// Bytes that grow; every part starts on a multiple of 16.
+/// Bytes that grow; every part starts on a multiple of 4.
 class Blob {
   public:
     template <class T>
     std::uint32_t append(const T* data, std::size_t count) {
-        bytes_.resize((bytes_.size() + 15) / 16 * 16);
+        bytes_.resize((bytes_.size() + 3) / 4 * 4);
         const std::size_t offset = bytes_.size();
         bytes_.resize(offset + count * sizeof(T));
         if (count > 0) std::memcpy(bytes_.data() + offset, data, count * sizeof(T));
@@ -40,14 +40,9 @@ class Blob {
 
 PackTable write_table(Blob& blob, const PackedTable& table) {
     const auto rank = static_cast<std::uint32_t>(table.weights.size()),
-               even = static_cast<std::uint32_t>(table.even_rank);
+               even = static_cast<std::uint32_t>(table.even_rank), stride = table.stride();
     if (even < 1 || even > rank) throw Error("pack: expected 1 to {} even components, found {}", rank, even);
-    const std::uint32_t stride = padded_rank(even) + padded_rank(rank - even);
     if (stride > max_rank) throw Error("pack: expected at most {} components, found {}", max_rank, stride);
-    // Where component r is stored: even ones from 0 on, odd ones from the next multiple on.
-    const auto place = [&](Eigen::Index r) {
-        return static_cast<std::uint32_t>(r < table.even_rank ? r : r - table.even_rank + padded_rank(even));
-    };
     PackTable layout = {};
     layout.kind = static_cast<std::uint32_t>(table.kind);
     layout.even_rank = even;
@@ -56,22 +51,31 @@ PackTable write_table(Blob& blob, const PackedTable& table) {
     layout.axis_count = static_cast<std::uint32_t>(table.axes.size());
     layout.low = table.low;
     layout.high = table.high;
+    std::vector<std::size_t> starts;  // of a row's blocks
+    for (std::size_t i = 0; i < stride / rank_multiple; ++i) {
+        const std::uint32_t bits = table.bits.empty() ? 16 : table.bits[i];
+        starts.push_back(layout.row_bytes);
+        layout.block_bits[i] = static_cast<std::uint8_t>(bits);
+        layout.row_bytes += bits;
+    }
     Eigen::VectorXd scales = table.weights;
     Eigen::VectorXd integrals = Eigen::VectorXd::Zero(rank);
     for (std::size_t k = 0; k < table.axes.size(); ++k) {
         const PackedAxis& axis = table.axes[k];
         const Eigen::MatrixXd& rows = axis.coefficients;
-        std::vector<unsigned char> stored(static_cast<std::size_t>(rows.rows()) * row_bytes(stride), 0);
+        std::vector<unsigned char> stored(static_cast<std::size_t>(rows.rows()) * layout.row_bytes, 0);
         const bool exit = table.has_exit() && k + 1 == table.axes.size();
         const Eigen::VectorXd basis_integrals = axis.spline.integrals();
         for (Eigen::Index r = 0; r < rank; ++r) {
-            const double greatest = rows.col(r).cwiseAbs().maxCoeff();
-            const double unit = greatest / greatest_number;
-            scales[r] *= unit;
+            const std::uint32_t place = table.place(r), bits = layout.block_bits[place / rank_multiple];
+            const double greatest = rows.col(r).cwiseAbs().maxCoeff(), unit = greatest / greatest_of(bits);
+            const int step = 1 << (16 - bits);
+            scales[r] *= unit / step;
             for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-                const double q = greatest > 0 ? std::nearbyint(rows(i, r) / unit) : 0;
-                store_number(stored.data() + static_cast<std::size_t>(i) * row_bytes(stride), place(r),
-                             static_cast<int>(q));
+                const double q = greatest > 0 ? std::nearbyint(rows(i, r) / unit) * step : 0;
+                store_number(
+                    stored.data() + static_cast<std::size_t>(i) * layout.row_bytes + starts[place / rank_multiple],
+                    bits, place % rank_multiple, static_cast<int>(q));
                 if (exit && r < table.even_rank) integrals[r] += 2 * q * basis_integrals[i];
             }
         }
@@ -83,17 +87,23 @@ PackTable write_table(Blob& blob, const PackedTable& table) {
         out.knots_offset = blob.append_knots(knots);
         out.rows_offset = blob.append(stored.data(), stored.size());
     }
-    const auto floats = [&](const Eigen::VectorXd& values) {
+    const auto floats = [&](const Eigen::VectorXd& values, std::uint32_t count) {
         std::vector<float> padded(stride, 0.0f);
-        for (Eigen::Index r = 0; r < rank; ++r) padded[place(r)] = static_cast<float>(values[r]);
-        return blob.append(padded.data(), padded.size());
+        for (Eigen::Index r = 0; r < rank; ++r) padded[table.place(r)] = static_cast<float>(values[r]);
+        return blob.append(padded.data(), count);
     };
-    layout.scales_offset = floats(scales);
-    if (table.has_exit()) layout.integrals_offset = floats(integrals);
+    layout.scales_offset = floats(scales, stride);
+    if (table.has_exit()) layout.integrals_offset = floats(integrals, table.even_stride());
     return layout;
 }
 
 }  // namespace
+
+std::size_t PackedTable::rows() const {
+    std::size_t sum = 0;
+    for (const PackedAxis& axis : axes) sum += static_cast<std::size_t>(axis.spline.size());
+    return sum;
+}
 
 std::vector<unsigned char> write_pack(const std::vector<PackedTable>& tables, const std::string& provenance) {
     Blob blob;

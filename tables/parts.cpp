@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "medulla/phase.hpp"
 #include "tables/source.hpp"
@@ -157,10 +158,10 @@ void add_energies(const Tables& tables, std::vector<Part>& parts) {
 
 }  // namespace
 
-std::size_t Part::component_bytes() const {
-    std::size_t rows = 0;
-    for (const PackedAxis& axis : axes) rows += static_cast<std::size_t>(axis.spline.size());
-    return (4 + 4 + rows * row_bytes(rank_multiple) / rank_multiple) * static_cast<std::size_t>(copies());
+double Part::component_bytes(double bits) const {
+    double rows = 0;
+    for (const PackedAxis& axis : axes) rows += static_cast<double>(axis.spline.size());
+    return (4 + 4 + rows * bits / 8) * copies();
 }
 
 std::vector<double> exit_breakpoints(TableKind kind, std::size_t bins, std::size_t spans) {
@@ -243,24 +244,49 @@ std::vector<Part> whole_lobes_of(const Tables& tables, const ExitSpans& spans) {
     return parts;
 }
 
+namespace {
+
+/// What errors of independent spline coefficients make of a factor's squared length, for one unit of variance each.
+double gain_of(const Eigen::MatrixXd& map) {
+    return map.completeOrthogonalDecomposition().pseudoInverse().squaredNorm();
+}
+
+}  // namespace
+
 PackedTable join(const std::vector<const Part*>& parts, const std::vector<const tensor::CpModel*>& models,
                  std::pair<float, float> range) {
     PackedTable table{parts[0]->kind, parts[0]->axes, {}, models[0]->rank(), range.first, range.second};
     int rank = 0;
     for (std::size_t p = 0; p < parts.size(); ++p) rank += models[p]->rank() * parts[p]->copies();
-    table.weights.resize(rank);
+    table.weights.resize(rank), table.rounding.resize(rank);
+    table.twins = parts[0]->copies() == 2;
     for (PackedAxis& axis : table.axes) axis.coefficients.resize(axis.spline.size(), rank);
     int column = 0;
     for (std::size_t p = 0; p < parts.size(); ++p)
         for (int copy = 0; copy < parts[p]->copies(); ++copy) {
+            const Part& part = *parts[p];
             const tensor::CpModel& model = *models[p];
+            const double unit = part.share / tensor::norm(part.values);
+            std::vector<Eigen::MatrixXd> coefficients;
+            Eigen::VectorXd rounding = Eigen::VectorXd::Zero(model.rank());
             for (std::size_t k = 0; k < table.axes.size(); ++k) {
                 const Eigen::MatrixXd& map =
-                    k < parts[p]->maps.size() ? parts[p]->maps[k] : parts[p]->exit_maps[static_cast<std::size_t>(copy)];
-                table.axes[k].coefficients.middleCols(column, model.rank()) = map * model.factors[k];
+                    k < part.maps.size() ? part.maps[k] : part.exit_maps[static_cast<std::size_t>(copy)];
+                coefficients.push_back(map * model.factors[k]);
+                // A number is off by up to half a unit, evenly: variance 1 / 12.
+                rounding.array() += gain_of(map) / 12 *
+                                    coefficients[k].colwise().lpNorm<Eigen::Infinity>().transpose().array().square();
             }
-            table.weights.segment(column, model.rank()) = model.weights;
-            column += model.rank();
+            rounding.array() *= (unit * model.weights).array().square();
+            std::vector<int> order(static_cast<std::size_t>(model.rank()));
+            std::iota(order.begin(), order.end(), 0);
+            if (!table.twins)
+                std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return rounding[a] > rounding[b]; });
+            for (const int r : order) {
+                for (std::size_t k = 0; k < table.axes.size(); ++k)
+                    table.axes[k].coefficients.col(column) = coefficients[k].col(r);
+                table.weights[column] = model.weights[r], table.rounding[column++] = rounding[r];
+            }
         }
     return table;
 }

@@ -30,8 +30,8 @@ struct Part {
     bool lobes() const { return is_lobe(kind); }
     /// Components of the pack for each component of the model.
     int copies() const { return static_cast<int>(std::max<std::size_t>(1, exit_maps.size())); }
-    /// Bytes that one component of the model takes in a pack (12-bit rows, a scale, an integral).
-    std::size_t component_bytes() const;
+    /// Bytes that one component of the model takes in a pack: rows of so many bits a number, a scale, an integral.
+    double component_bytes(double bits) const;
 };
 
 /// Breakpoints of the exit splines on [0, pi] or [0, pi/2] over half of the `bins` bins of the full circle or half
@@ -60,7 +60,8 @@ std::vector<Part> parts_of(const Tables& tables, const ExitSpans& spans);
 /// condition of the B-spline bases (a factor of two or so).
 std::vector<Part> whole_lobes_of(const Tables& tables, const ExitSpans& spans);
 
-/// Joins the models of one kind's parts (even first) into a table of the pack.
+/// Joins the models of one kind's parts (even first) into a table of the pack. Components of a part come in the order
+/// in which rounding harms them, so that those of a block need about as many bits.
 PackedTable join(const std::vector<const Part*>& parts, const std::vector<const tensor::CpModel*>& models,
                  std::pair<float, float> range);
 

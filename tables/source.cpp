@@ -8,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
@@ -168,24 +169,40 @@ class PackSource : public Source {
         const TableView& table = pack_[kind];
         const Contraction contraction = contract(table, query(at));
         const std::uint32_t exit = table.parameter_axes(), rows = table.layout.axes[exit].spans + 3;
-        const std::uint32_t stride = table.layout.rank_stride, middle = table.even_stride();
         // Spline coefficients for y > 0 and y < 0: even part plus and minus the odd one.
         std::vector<double> coefficients[2] = {std::vector<double>(rows), std::vector<double>(rows)};
         for (std::uint32_t j = 0; j < rows; ++j) {
-            const unsigned char* row = table.row(exit, j);
+            const unsigned char* block = table.row(exit, j);
             double part[2] = {0, 0};
-            for (std::uint32_t r = 0; r < stride; ++r)
-                part[r < middle ? 0 : 1] += static_cast<double>(contraction.weight[r]) * load_number(row, r);
+            for (std::uint32_t first = 0; first < table.layout.rank_stride; first += rank_multiple) {
+                const std::uint32_t bits = table.bits(first);
+                for (std::uint32_t r = 0; r < rank_multiple; ++r)
+                    part[first < table.even_stride() ? 0 : 1] +=
+                        static_cast<double>(contraction.weight[first + r]) * load_number(block, bits, r);
+                block += bits;
+            }
             const auto scale = static_cast<double>(contraction.inverse_integral);
             coefficients[0][j] = (part[0] + part[1]) * scale, coefficients[1][j] = (part[0] - part[1]) * scale;
         }
-        const std::vector<Point>& points = gauss_points(kind, bins);
+        // What medulla::lobe returns, averaged: bins with an end of a dip below 0 are cut into sixteen.
+        const std::vector<Point>&coarse = gauss_points(kind, bins, 1), &fine = gauss_points(kind, bins, 16);
         std::vector<double> out(bins, 0.0);
-        for (std::size_t i = 0; i < points.size(); ++i) {
-            const std::vector<double>& c = coefficients[points[i].negative ? 1 : 0];
-            double value = 0;
-            for (std::uint32_t t = 0; t < 4; ++t) value += points[i].basis[t] * c[points[i].span + t];
-            out[i / 3] += points[i].weight * std::max(value, 0.0);  // what medulla::lobe returns
+        const auto add = [&](std::size_t bin, const std::vector<Point>& points) {
+            const std::size_t count = points.size() / bins;
+            for (std::size_t i = bin * count; i < (bin + 1) * count; ++i) {
+                const double* c = &coefficients[points[i].negative ? 1 : 0][points[i].span];
+                double value = 0;
+                for (std::uint32_t t = 0; t < 4; ++t) value += points[i].basis[t] * c[t];
+                out[bin] += points[i].weight * std::max(value, 0.0);
+            }
+        };
+        for (std::size_t bin = 0; bin < bins; ++bin) {
+            bool dips = false;
+            for (std::size_t i = 3 * bin; i < 3 * bin + 3; ++i) {
+                const double* c = &coefficients[coarse[i].negative ? 1 : 0][coarse[i].span];
+                dips = dips || std::min({c[0], c[1], c[2], c[3]}) < 0;
+            }
+            add(bin, dips ? fine : coarse);
         }
         return out;
     }
@@ -232,22 +249,22 @@ class PackSource : public Source {
         q.theta_i = static_cast<float>(at.theta_i), q.absorption = static_cast<float>(at.absorption);
         return q;
     }
-    /// Three Gauss points per bin: the basis there, worked out once per number of bins.
-    const std::vector<Point>& gauss_points(TableKind kind, std::size_t bins) const {
+    /// Three Gauss points per part of a bin: the basis there, worked out once per number of bins.
+    const std::vector<Point>& gauss_points(TableKind kind, std::size_t bins, int parts) const {
         const std::lock_guard<std::mutex> lock(mutex_);
-        std::vector<Point>& points = points_[{kind, bins}];
+        std::vector<Point>& points = points_[{kind, bins, parts}];
         if (!points.empty()) return points;
         const TableView& table = pack_[kind];
         const AxisView<float> axis = table.axis(table.parameter_axes());
-        const double high = static_cast<double>(axis.upper()), width = 2 * high / static_cast<double>(bins);
+        const double high = static_cast<double>(axis.upper()), width = 2 * high / static_cast<double>(bins) / parts;
         const double node[3] = {0.5 - std::sqrt(0.15), 0.5, 0.5 + std::sqrt(0.15)},
                      weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
-        for (std::size_t b = 0; b < bins; ++b)
+        for (std::size_t part = 0; part < bins * static_cast<std::size_t>(parts); ++part)
             for (int i = 0; i < 3; ++i) {
-                const auto y = static_cast<float>((static_cast<double>(b) + node[i]) * width - high);
+                const auto y = static_cast<float>((static_cast<double>(part) + node[i]) * width - high);
                 const Cell<float> cell = locate(axis, std::abs(y));
                 const SplineWeights<float> w = spline_weights(axis, cell);
-                points.push_back({cell.span, y < 0, {w.w[0], w.w[1], w.w[2], w.w[3]}, weight[i]});
+                points.push_back({cell.span, y < 0, {w.w[0], w.w[1], w.w[2], w.w[3]}, weight[i] / parts});
             }
         return points;
     }
@@ -256,7 +273,7 @@ class PackSource : public Source {
     PackView pack_;
     std::array<double, lobe_kinds.size()> noise_ = {};
     mutable std::mutex mutex_;
-    mutable std::map<std::pair<TableKind, std::size_t>, std::vector<Point>> points_;
+    mutable std::map<std::tuple<TableKind, std::size_t, int>, std::vector<Point>> points_;
 };
 
 double norm2(const std::vector<double>& v) {

@@ -123,20 +123,23 @@ class PackBuilder {
                 return std::uint32_t(r < spec.even ? r : r - spec.even + int(padded_rank(table.even_rank)));
             };
             table.axis_count = std::uint32_t(spec.axes.size());
+            for (std::uint32_t i = 0; i < table.rank_stride / rank_multiple; ++i)
+                table.block_bits[i] = 16, table.row_bytes += 16;
             std::vector<float> scales(table.rank_stride, 0.0f), integrals(table.rank_stride, 0.0f);
             for (int r = 0; r < spec.rank; ++r) scales[place(r)] = 1;
             for (std::size_t k = 0; k < spec.axes.size(); ++k) {
                 const AxisSpec& axis = spec.axes[k];
                 const auto spans = std::uint32_t(axis.breakpoints.size() - 1);
                 const auto knots = packed_knots<float>(with_ghosts(axis.breakpoints));
-                std::vector<unsigned char> rows(std::size_t(spans + 3) * row_bytes(table.rank_stride), 0);
+                std::vector<unsigned char> rows(std::size_t(spans + 3) * table.row_bytes, 0);
                 for (int r = 0; r < spec.rank; ++r) {
                     const auto c = interpolate(axis.breakpoints, [&](double x) { return axis.factor(r, x); });
                     double most = 0;
                     for (double x : c) most = std::max(most, std::abs(x));
                     const double unit = most > 0 ? most / greatest_number : 1;
                     for (std::size_t j = 0; j < c.size(); ++j)
-                        store_number(&rows[j * row_bytes(table.rank_stride)], place(r), int(std::lround(c[j] / unit)));
+                        store_number(&rows[j * table.row_bytes + place(r) / 8 * 16], 16, place(r) % 8,
+                                     int(std::lround(c[j] / unit)));
                     scales[place(r)] *= float(unit);
                 }
                 table.axes[k].quantity = std::uint32_t(axis.quantity);
@@ -179,7 +182,8 @@ class PackBuilder {
                 const auto w = spline_weights(axis, Cell<float>{i, float((a + b) / 2 + x * (b - a) / 2)});
                 for (std::uint32_t k = 0; k < 4; ++k)
                     for (std::uint32_t r = 0; r < even; ++r)
-                        sum[r] += (b - a) * double(w.w[k]) * load_number(&rows[(i + k) * row_bytes(stride)], r);
+                        sum[r] +=
+                            (b - a) * double(w.w[k]) * load_number(&rows[(i + k) * stride * 2 + r / 8 * 16], 16, r % 8);
             }
         }
         return std::vector<float>(sum.begin(), sum.end());

@@ -72,7 +72,7 @@ inline Lobes near_lobes(const FurParameters<3>& p, const PackView& pack, double 
                          (tabled ? double(survival(pack, q.sigma, q.g, q.h, q.absorption)) : 1);
         for (int k = 1; k <= 2; ++k) {
             const double centre = (gamma_t - gamma_i) + (k - 1) * (pi + 2 * gamma_t);
-            C[k] = E * double(lobe(table, contract(table, q), side * float(phi - centre - pi)));
+            C[k] = E * double(lobe(table, contract_signed(table, q), side * float(phi - centre - pi)));
         }
         const double t = std::abs(std::remainder(phi, 2 * pi)) / pi;
         M = (1 - t) * double(longitudinal(pack, Side::back, sigma, p.g, float(theta_i), float(theta_r))) +

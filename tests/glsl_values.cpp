@@ -1,5 +1,6 @@
 // What `furtable export --format glsl` writes, compiled as C++ with a small vec4 and held against the runtime: the same
-// sums in the same order give the same bits; only 1 - exp(-x) is another formula. glsl_values ABSORBING.furpack
+// sums in the same order give the same bits; only 1 - exp(-x) is another formula. Shaders take the signed contraction.
+// glsl_values ABSORBING.furpack
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -92,20 +93,28 @@ int main(int, char** argv) {
         LobeQuery query;
         query.sigma = sigma, query.g = g, query.h = std::abs(h);
         const TableView& table = plain.pack[TableKind::azimuthal];
-        same("lobe", lobe(table, contract(table, query), phi),
+        same("lobe", lobe(table, contract_signed(table, query), phi),
              glsl::built_in_lobe(glsl::built_in_AZIMUTHAL,
                                  glsl::built_in_contract(glsl::built_in_AZIMUTHAL, {sigma, g, 0, std::abs(h)}), phi));
-        near("azimuthal", azimuthal(plain.pack, sigma, g, h, phi), glsl::built_in_azimuthal(sigma, g, h, phi));
-        for (const Side side : {Side::back, Side::forward})
-            same("longitudinal", longitudinal(plain.pack, side, sigma, g, theta_i, theta_r),
-                 glsl::built_in_longitudinal(side == Side::forward, sigma, g, theta_i, theta_r));
+        const float sign = h < 0 ? -1.0f : 1.0f;
+        const auto of_disc = [&](const PackView& pack) {
+            const TableView& disc = pack[TableKind::azimuthal];
+            return azimuthal_energy(sigma, h) * survival(pack, sigma, g, h, query.absorption) *
+                   lobe(disc, contract_signed(disc, query), sign * phi);
+        };
+        near("azimuthal", of_disc(plain.pack), glsl::built_in_azimuthal(sigma, g, h, phi));
         query.theta_i = std::abs(theta_i);
+        for (const TableKind kind : {TableKind::longitudinal_back, TableKind::longitudinal_forward}) {
+            const TableView& slab = plain.pack[kind];
+            same("longitudinal", lobe(slab, contract_signed(slab, query), theta_i < 0 ? -theta_r : theta_r),
+                 glsl::built_in_longitudinal(kind == TableKind::longitudinal_forward, sigma, g, theta_i, theta_r));
+        }
         const TableView& shares = plain.pack[TableKind::back_fraction];
         same("back_fraction", scalar(shares, contract(shares, query)), glsl::built_in_back_fraction(sigma, g, theta_i));
         same("survival", survival(opened.pack, sigma, g, h, absorption),
              glsl::absorbing_survival(sigma, g, h, absorption));
-        near("azimuthal, absorbing", azimuthal(opened.pack, sigma, g, h, phi, absorption),
-             glsl::absorbing_azimuthal(sigma, g, h, phi, absorption));
+        query.absorption = absorption;
+        near("azimuthal, absorbing", of_disc(opened.pack), glsl::absorbing_azimuthal(sigma, g, h, phi, absorption));
     }
     std::printf("%d queries, %d unlike the runtime; 1 - exp(-x) makes at most %.1e\n", count, failures, worst);
     return failures == 0 ? 0 : 1;

@@ -220,7 +220,7 @@ class Hostile(unittest.TestCase):
         whole = struct.Struct("<I").pack
         table = struct.unpack_from("<I", self.pack, 32)[0]
         scales = struct.unpack_from("<I", self.pack, table + 20)[0]
-        axes = table + 36
+        axes = table + 104
         lie("version", offset=8, value=whole(2))
         lie("kind, rank", offset=table + 4, value=whole(0))
         lie("outside the pack", offset=axes + 16, value=whole(0xfffffff0))

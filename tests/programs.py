@@ -90,7 +90,7 @@ class Programs(unittest.TestCase):
         text = " ".join(run("medulla-precompute", "--help")[1].split())
         self.assertIn("relative L2 error of 0.001", text)
         self.assertIn("padded with zeros to a multiple of 8", run("furtable", "compress", "--help")[1])
-        self.assertRegex(run("furtable", "verify", "--help")[1], r"--max-integral-error FLOAT.*=0\.5")
+        self.assertRegex(run("furtable", "verify", "--help")[1], r"--max-dip FLOAT.*=0\.5")
         info = run("furtable", "info", self.path("t.h5"))[1]
         self.assertIn("method auto: without paths, or with 2000", info)
         file = self.path("exact.h5")
@@ -126,7 +126,11 @@ class Programs(unittest.TestCase):
             report = json.loads(out)
             for kind, error in report["errors"].items():
                 self.assertLessEqual(error["relative_l2"], bound)
-                self.assertAlmostEqual(report["factors"][kind]["relative_l2_in_pack"] / error["relative_l2"], 1, delta=0.01)
+                factors = report["factors"][kind]
+                stated = math.hypot(factors["relative_l2_in_pack"], factors["relative_l2_of_rounding"])
+                # Rounding is stated in the metric of the solver, the bins' but for the condition of B-splines: too much.
+                self.assertLess(0.99 * factors["relative_l2_in_pack"], error["relative_l2"])
+                self.assertLess(error["relative_l2"], 1.01 * stated)
 
     def test_verify_checks_every_file(self):
         with open(self.path("bad.furpack"), "wb") as f:
@@ -142,13 +146,13 @@ class Programs(unittest.TestCase):
         self.assertEqual(list(entries), files)
         self.assertEqual([entry["ok"] for entry in entries.values()], [False, True, False, True])
         for file, entry in entries.items():
-            self.assertEqual(list(entry), ["ok", "error", "cells", "energy_error", "degeneracy"])
+            self.assertEqual(list(entry), ["ok", "error", "cells", "energy_error", "dip", "degeneracy"])
             self.assertEqual(entry["error"] is None, entry["ok"])
             if not entry["ok"]:
                 self.assertIn(file, entry["error"])
-        found = entries[files[3]]["energy_error"]
-        self.assertEqual(run("furtable", "verify", files[3], "--max-integral-error", 1.01 * found)[0], 0)
-        self.fails(1, "furtable", "verify", files[3], "--max-integral-error", 0.99 * found, names=["integral 1"])
+        found = entries[files[3]]["dip"]
+        self.assertEqual(run("furtable", "verify", files[3], "--max-dip", 1.01 * found)[0], 0)
+        self.fails(1, "furtable", "verify", files[3], "--max-dip", 0.99 * found, names=["integral 1"])
 
     def test_target_error(self):
         coarse = SMALL[:-4] + ["--progress", "none", "--json", "--target-error", "0.05"]
@@ -175,8 +179,8 @@ class Programs(unittest.TestCase):
             self.assertEqual(run("furtable", "compress", self.path("t.h5"), "--max-error", bound, "-o", pack)[0], 0)
             self.assertEqual(run("furtable", "verify", pack)[0], 0, bound)
             errors = json.loads(run("furtable", "diff", self.path("t.h5"), pack, "--json")[1])["errors"]
-            for kind in errors.values():  # rounding to 12 bits adds up to 5 %
-                self.assertLessEqual(kind["relative_l2"], 1.05 * bound)
+            for kind in errors.values():
+                self.assertLessEqual(kind["relative_l2"], bound)
 
     def test_no_input_is_written_over(self):
         with open(self.path("t.h5"), "rb") as f:

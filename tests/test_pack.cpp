@@ -66,20 +66,99 @@ void poke(std::vector<unsigned char>& bytes, std::size_t offset, T value) {
 
 }  // namespace
 
-TEST_CASE("Numbers of 12 bits come back as they were stored, one by one and eight abreast", "[pack]") {
-    for (int first = -greatest_number; first <= greatest_number; ++first) {
-        unsigned char row[12] = {};
-        int numbers[8];
-        for (int r = 0; r < 8; ++r) {
-            numbers[r] = (first + r * 911 + greatest_number) % (2 * greatest_number + 1) - greatest_number;
-            store_number(row, std::uint32_t(r), numbers[r]);
+TEST_CASE("Numbers of every width come back as they were stored, one by one and eight abreast", "[pack]") {
+    for (const std::uint32_t bits : {4u, 8u, 12u, 16u}) {
+        const int step = 1 << (16 - bits), greatest = greatest_of(bits);
+        for (int first = -greatest; first <= greatest; ++first) {
+            unsigned char block[16] = {};
+            int numbers[8];
+            for (int r = 0; r < 8; ++r) {
+                numbers[r] = ((first + r * 911 + greatest) % (2 * greatest + 1) - greatest) * step;
+                store_number(block, bits, std::uint32_t(r), numbers[r]);
+            }
+            float eight[8];
+            detail::store_eight(detail::convert_eight(block, bits), eight);
+            for (std::uint32_t r = 0; r < 8; ++r)
+                if (load_number(block, bits, r) != numbers[r] || eight[r] != float(numbers[r])) FAIL(numbers[r]);
+            for (std::uint32_t i = bits; i < 16; ++i) REQUIRE(block[i] == 0);  // so many bytes and no more
         }
-        float eight[8];
-        detail::store_eight(detail::convert_eight(row), eight);
-        for (int r = 0; r < 8; ++r)
-            if (load_number(row, std::uint32_t(r)) != numbers[r] || eight[r] != float(numbers[r])) FAIL(numbers[r]);
     }
     SUCCEED();
+}
+
+TEST_CASE("A row of blocks of unlike width has the numbers of each", "[pack]") {
+    // Factor r of sigma is 1 + r + sigma, four widths of eight components each; other axes do nothing.
+    constexpr int rank = 32;
+    PackedTable table{TableKind::back_fraction, {}, Eigen::VectorXd::Ones(rank), rank, 0, 1};
+    table.bits = {8, 16, 4, 12};
+    const std::vector<double> nodes = {0, 1, 4};
+    for (const Quantity quantity : {Quantity::sigma, Quantity::g, Quantity::theta_i}) {
+        const std::vector<double> at = quantity == Quantity::sigma ? nodes : std::vector<double>{0};
+        const Spline spline = Spline::through(quantity, at);
+        Eigen::MatrixXd values(static_cast<Eigen::Index>(at.size()), rank);
+        for (std::size_t i = 0; i < at.size(); ++i)
+            for (int r = 0; r < rank; ++r)
+                values(static_cast<Eigen::Index>(i), r) = quantity == Quantity::sigma ? 1 + r + at[i] : 1.0;
+        table.axes.push_back({quantity, static_cast<std::uint32_t>(at.size()), spline, spline.from_nodes() * values});
+    }
+    const std::vector<unsigned char> bytes = write_pack({table}, "{}");
+    const OpenResult opened = open_pack(bytes.data(), bytes.size());
+    REQUIRE(opened.status == PackStatus::ok);
+    const TableView& view = opened.pack[TableKind::back_fraction];
+    REQUIRE(view.layout.row_bytes == 8 + 16 + 4 + 12);
+    for (const double sigma : nodes) {
+        LobeQuery query;
+        query.sigma = float(sigma);
+        const Contraction contraction = contract(view, query);
+        for (std::uint32_t r = 0; r < rank; ++r) {
+            const double greatest = table.axes[0].coefficients.col(r).cwiseAbs().maxCoeff();
+            const double unit = greatest / greatest_of(table.bits[r / 8]);
+            CHECK(double(contraction.weight[r]) == Approx(1 + r + sigma).epsilon(1e-6).margin(unit / 2));
+            // The plain twin reads the same.
+            const auto scale = double(detail::load<float>(bytes.data() + view.layout.scales_offset + 4 * r));
+            for (std::uint32_t j = 0; j < view.layout.axes[0].spans + 3; ++j)
+                CHECK(scale * view.number(0, j, r) * view.number(1, 0, r) * view.number(2, 0, r) ==
+                      Approx(table.axes[0].coefficients(j, r)).margin(unit / 2 * (1 + 1e-6)));
+        }
+    }
+}
+
+TEST_CASE("Rows blended and summed are those of eight components at a time, to the bit", "[pack]") {
+    const OpenResult opened = open_pack(default_pack_words, default_pack_size);
+    REQUIRE(opened.status == PackStatus::ok);
+    for (const TableView& table : opened.pack.tables) {
+        if (!table) continue;
+        const std::uint32_t k = table.layout.axis_count - 1, stride = table.layout.rank_stride;
+        Contraction c, scaled;
+        start_contraction(table, c.weight);
+        for (std::uint32_t row = 0; row + 4 <= table.layout.axes[k].spans + 3; ++row) {
+            const AxisPoint at = {row, {{0.1f, 0.55f, 0.33f, 0.02f}}};
+            detail::RowSums sums[4];
+            detail::four_row_sums(table, k, row, c.weight, sums);
+            for (std::uint32_t i = 0; i < 4; ++i) {
+                const detail::RowSums one = detail::row_sums(table, k, row + i, c.weight);
+                REQUIRE(one.even == sums[i].even);
+                REQUIRE(one.odd == sums[i].odd);
+            }
+            contract_axis(table, k, at, c.weight, scaled.weight);
+            const unsigned char* block = table.row(k, row);
+            detail::Eight sum[2] = {detail::zero_eight(), detail::zero_eight()};
+            for (std::uint32_t first = 0; first < stride; first += 8) {
+                const std::uint32_t bits = table.bits(first);
+                const detail::Eight term =
+                    detail::times(detail::load_eight(c.weight + first),
+                                  detail::blend(block, bits, table.layout.row_bytes, at.weights));
+                float expected[8];
+                detail::store_eight(term, expected);
+                for (std::uint32_t r = 0; r < 8; ++r) REQUIRE(scaled.weight[first + r] == expected[r]);
+                detail::Eight& part = sum[first < table.even_stride() ? 0 : 1];
+                part = detail::plus(part, term);
+                block += bits;
+            }
+            REQUIRE(detail::sum_of_blend(table, k, row, at.weights, c.weight, -1) ==
+                    detail::sum_of(detail::plus(sum[0], detail::times(-1.0f, sum[1]))));
+        }
+    }
 }
 
 TEST_CASE("A pack's lobes are the factors' lobes, and integrate to 1", "[pack]") {
@@ -100,7 +179,7 @@ TEST_CASE("A pack's lobes are the factors' lobes, and integrate to 1", "[pack]")
             Eigen::VectorXd even =
                 (1 + double(sigma)) * (1 - double(g)) * small_column(0) + 2 * (1 + double(g)) * 0.5 * small_column(1);
             const double whole = 2 * exit.integrals().dot(even);
-            // Half of 1 / 2047 of the greatest coefficient in each of four axes.
+            // Half of 1 / 32767 of the greatest coefficient in each of four axes.
             const double rounding = 4 * 0.5 / greatest_number *
                                     (even.cwiseAbs().maxCoeff() + h * small_column(2).cwiseAbs().maxCoeff()) / whole;
             double integral = 0;
@@ -146,6 +225,12 @@ TEST_CASE("Each defect of a pack is refused with its own status", "[pack]") {
     CHECK(status_after([&](auto& b) { poke(b, table + offsetof(PackTable, even_rank), 1000u); }) ==
           PackStatus::bad_table);
     CHECK(status_after([&](auto& b) { poke(b, table + offsetof(PackTable, kind), 7u); }) == PackStatus::bad_table);
+    CHECK(status_after([&](auto& b) { poke(b, table + offsetof(PackTable, row_bytes), 36u); }) ==
+          PackStatus::bad_table);
+    CHECK(status_after([&](auto& b) { poke<std::uint8_t>(b, table + offsetof(PackTable, block_bits), 10); }) ==
+          PackStatus::bad_table);
+    CHECK(status_after([&](auto& b) { poke<std::uint8_t>(b, table + offsetof(PackTable, block_bits) + 63, 8); }) ==
+          PackStatus::bad_table);
     CHECK(status_after([&](auto& b) { poke(b, axis + offsetof(PackAxis, quantity), 6u); }) == PackStatus::bad_axis);
     CHECK(status_after([&](auto& b) { poke(b, axis + offsetof(PackAxis, rows_offset), 0xfffffff0u); }) ==
           PackStatus::out_of_bounds);
@@ -186,7 +271,7 @@ TEST_CASE("Mutated packs with a valid checksum open and give finite numbers with
             bytes[random() % bytes.size()] = static_cast<unsigned char>(random());
         seal(bytes);
         const OpenResult opened = open_pack(bytes.data(), bytes.size());
-        if (opened.status != PackStatus::ok) continue;
+        if (opened.status != PackStatus::ok || !opened.pack[TableKind::azimuthal]) continue;  // a pack may be empty
         ++opened_count;
         // Whatever the numbers are now, they lie inside the pack (the address sanitizer looks on).
         CHECK(std::isfinite(azimuthal(opened.pack, 1.5f, 0.3f, 0.2f, 1.0f)));

@@ -71,9 +71,8 @@ MEDULLA_FN void distribute(const TableView& table, const Contraction& contractio
     std::uint32_t known = 0;  // they hold rows known - 3 .. known - 1
     const auto next_row = [&]() {
         even[0] = even[1], even[1] = even[2], odd[0] = odd[1], odd[1] = odd[2];
-        const std::uint32_t middle = table.even_stride(), end = table.layout.rank_stride;
-        even[2] = detail::row_sum(table, k, known, contraction.weight, 0, middle) * contraction.inverse_integral;
-        odd[2] = detail::row_sum(table, k, known++, contraction.weight, middle, end) * contraction.inverse_integral;
+        const detail::RowSums sum = detail::row_sums(table, k, known++, contraction.weight);
+        even[2] = sum.even * contraction.inverse_integral, odd[2] = sum.odd * contraction.inverse_integral;
     };
     const auto put = [&](int i, float y, float value) {
         out.edge[i] = y;

@@ -12,7 +12,7 @@
 namespace medulla {
 
 inline constexpr char pack_magic[8] = {'F', 'U', 'R', 'P', 'A', 'C', 'K', '\n'};
-inline constexpr std::uint32_t pack_version = 3;
+inline constexpr std::uint32_t pack_version = 4;
 inline constexpr std::uint32_t max_rank = 512;
 inline constexpr std::uint32_t max_axes = 6;
 inline constexpr std::uint32_t max_spans = 4096;
@@ -26,24 +26,34 @@ MEDULLA_FN constexpr std::uint32_t padded_rank(std::uint32_t rank) noexcept {
     return (rank + rank_multiple - 1) / rank_multiple * rank_multiple;
 }
 
-/// Factors are whole numbers of 12 bits, -2047 .. 2047, eight in 12 bytes: the upper eight bits of each, then the lower
-/// four, two to a byte (the even component's in the lower half).
-inline constexpr int greatest_number = 2047;
-MEDULLA_FN constexpr std::size_t row_bytes(std::uint32_t stride) noexcept { return std::size_t(stride) / 2 * 3; }
-
-/// Number r of a row.
-MEDULLA_FN int load_number(const unsigned char* row, std::uint32_t r) noexcept {
-    const unsigned char* eight = row + row_bytes(r / 8 * 8);
-    const int lower = eight[8 + r % 8 / 2] >> (r % 2 * 4) & 15, upper = eight[r % 8];
-    return (upper < 128 ? upper : upper - 256) * 16 + lower;
+/// Factors are whole numbers of 16 bits, -32767 .. 32767. Eight components side by side are a block, of whose numbers a
+/// row keeps the upper 4, 8, 12 or 16 bits; the others are 0. A block of b bits takes b bytes: the upper eight bits of
+/// each number, then the next four, two to a byte (the even component's in the lower half), or eight. Of four bits
+/// there are only those, two to a byte.
+inline constexpr int greatest_number = 32767;
+inline constexpr std::uint32_t max_blocks = max_rank / rank_multiple;
+MEDULLA_FN constexpr bool is_width(std::uint32_t bits) noexcept {
+    return bits == 4 || bits == 8 || bits == 12 || bits == 16;
 }
 
-/// Sets number r of a row whose number was 0.
-inline void store_number(unsigned char* row, std::uint32_t r, int number) noexcept {
-    unsigned char* eight = row + row_bytes(r / 8 * 8);
-    const auto bits = static_cast<unsigned>(number);
-    eight[r % 8] = static_cast<unsigned char>(bits >> 4 & 255u);
-    eight[8 + r % 8 / 2] |= static_cast<unsigned char>((bits & 15u) << (r % 2 * 4));
+/// Number r of a block, 0 <= r < 8.
+MEDULLA_FN int load_number(const unsigned char* block, std::uint32_t bits, std::uint32_t r) noexcept {
+    const auto half = [r](const unsigned char* halves) { return halves[r / 2] >> (r % 2 * 4) & 15; };
+    const int upper = bits == 4 ? half(block) * 16 : block[r];
+    const int lower = bits == 12 ? half(block + 8) * 16 : (bits == 16 ? block[8 + r] : 0);
+    return (upper < 128 ? upper : upper - 256) * 256 + lower;
+}
+
+/// Sets number r of a block whose number was 0.
+inline void store_number(unsigned char* block, std::uint32_t bits, std::uint32_t r, int number) noexcept {
+    const auto word = static_cast<unsigned>(number);
+    const auto put_half = [r](unsigned char* halves, unsigned half) {
+        halves[r / 2] |= static_cast<unsigned char>((half & 15u) << (r % 2 * 4));
+    };
+    if (bits == 4) return put_half(block, word >> 12);
+    block[r] = static_cast<unsigned char>(word >> 8 & 255u);
+    if (bits == 12) put_half(block + 8, word >> 4);
+    if (bits == 16) block[8 + r] = static_cast<unsigned char>(word & 255u);
 }
 
 /// The tables a pack can hold. The numbers are part of the format.
@@ -78,7 +88,7 @@ struct PackAxis {
     std::uint32_t nodes;         ///< nodes (or bins) of the table it was made from, for information
     std::uint32_t spans;         ///< of the spline
     std::uint32_t knots_offset;  ///< Knot<float>[spans + 5]
-    std::uint32_t rows_offset;   ///< spans + 3 rows of rank_stride numbers: spline coefficients, one row for each
+    std::uint32_t rows_offset;   ///< spans + 3 rows of blocks: spline coefficients, one row for each
     std::uint32_t reserved[3];   ///< 0
 };
 static_assert(sizeof(PackAxis) == 32);
@@ -91,11 +101,13 @@ struct PackTable {
     std::uint32_t axis_count;     ///< 1 .. max_axes; the last one is the exit direction, where there is one
     std::uint32_t scales_offset;  ///< float[rank_stride]: weight of one unit in every axis
     std::uint32_t
-        integrals_offset;  ///< float[rank_stride]: integral of the exit spline of a component; 0: no exit axis
-    float low, high;       ///< least and greatest value of the table it was made from
+        integrals_offset;     ///< float[even_rank, padded]: integral of a component's exit spline; 0: no exit axis
+    float low, high;          ///< least and greatest value of the table it was made from
+    std::uint32_t row_bytes;  ///< of a row, on every axis: the sum of block_bits
+    std::uint8_t block_bits[max_blocks];  ///< 4, 8, 12 or 16 for each block there is, then 0
     PackAxis axes[max_axes];
 };
-static_assert(sizeof(PackTable) == 228);
+static_assert(sizeof(PackTable) == 296 && offsetof(PackTable, axes) == 104);
 
 /// 64-bit FNV-1a with the header's checksum field read as zeros. Any change of one byte changes it.
 MEDULLA_FN std::uint64_t pack_checksum(const unsigned char* bytes, std::size_t count) noexcept {
@@ -119,9 +131,19 @@ struct TableView {
     }
     /// Components [0, even_stride) are mirror-even, [even_stride, rank_stride) mirror-odd.
     MEDULLA_FN std::uint32_t even_stride() const noexcept { return padded_rank(layout.even_rank); }
-    /// Row `row_index` of axis k: row_bytes(rank_stride) bytes of numbers.
+    /// Row `row_index` of axis k: its blocks, one after the other.
     MEDULLA_FN const unsigned char* row(std::uint32_t k, std::uint32_t row_index) const noexcept {
-        return bytes + layout.axes[k].rows_offset + std::size_t(row_index) * row_bytes(layout.rank_stride);
+        return bytes + layout.axes[k].rows_offset + std::size_t(row_index) * layout.row_bytes;
+    }
+    /// Of the block that begins with component `first`.
+    MEDULLA_FN std::uint32_t bits(std::uint32_t first) const noexcept {
+        return layout.block_bits[first / rank_multiple];
+    }
+    /// One number of a row: the plain twin of lookup.hpp's blocks.
+    MEDULLA_FN int number(std::uint32_t k, std::uint32_t row_index, std::uint32_t r) const noexcept {
+        const unsigned char* block = row(k, row_index);
+        for (std::uint32_t first = 0; first + rank_multiple <= r; first += rank_multiple) block += bits(first);
+        return load_number(block, bits(r), r % rank_multiple);
     }
     MEDULLA_FN bool has_exit() const noexcept { return layout.integrals_offset != 0; }
     MEDULLA_FN std::uint32_t parameter_axes() const noexcept { return layout.axis_count - (has_exit() ? 1u : 0u); }
@@ -170,7 +192,7 @@ inline const char* describe(PackStatus status) noexcept {
         case PackStatus::wrong_checksum:
             return "its checksum does not match";
         case PackStatus::bad_table:
-            return "a table's kind, rank or number of axes is outside the format";
+            return "a table's kind, rank, bits or number of axes is outside the format";
         case PackStatus::bad_axis:
             return "a table's axes are not those of its kind";
         case PackStatus::bad_knots:
@@ -258,13 +280,20 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
     if (table.rank_stride != padded_rank(table.even_rank) + padded_rank(table.odd_rank) || table.rank_stride > max_rank)
         return PackStatus::bad_table;
     if (!view.has_exit() && table.odd_rank != 0) return PackStatus::bad_table;
+    std::uint32_t row_bytes = 0;
+    for (std::uint32_t i = 0; i < max_blocks; ++i) {
+        const std::uint32_t bits = table.block_bits[i];
+        if (i < table.rank_stride / rank_multiple ? !is_width(bits) : bits != 0) return PackStatus::bad_table;
+        row_bytes += bits;
+    }
+    if (table.row_bytes != row_bytes) return PackStatus::bad_table;
     if (table.axis_count < 1 || table.axis_count > max_axes) return PackStatus::bad_table;
     if (!axes_fit(table)) return PackStatus::bad_axis;
     if (!finite(table.low) || !finite(table.high)) return PackStatus::bad_number;
     for (std::uint32_t k = 0; k < table.axis_count; ++k) {
         const PackAxis& axis = table.axes[k];
         const std::uint64_t knot_bytes = std::uint64_t(axis.spans + 1 + 2 * ghost_knots) * sizeof(Knot<float>);
-        const std::uint64_t rows = std::uint64_t(axis.spans + 3) * row_bytes(table.rank_stride);
+        const std::uint64_t rows = std::uint64_t(axis.spans + 3) * table.row_bytes;
         if (!inside(axis.knots_offset, knot_bytes, total)) return PackStatus::out_of_bounds;
         if (!inside(axis.rows_offset, rows, total)) return PackStatus::out_of_bounds;
         const PackStatus status = check_knots(view.axis(k));
@@ -272,11 +301,13 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
         const auto quantity = static_cast<Quantity>(axis.quantity);
         if (!half_circle(view.axis(k), quantity)) return PackStatus::bad_knots;
     }
-    const std::uint32_t offsets[2] = {table.scales_offset, table.integrals_offset};
+    // Odd components have no integral.
+    const std::uint32_t offsets[2] = {table.scales_offset, table.integrals_offset},
+                        counts[2] = {table.rank_stride, view.even_stride()};
     float sum[2] = {0, 0};
     for (std::uint32_t i = 0; i < (view.has_exit() ? 2u : 1u); ++i) {
-        if (!inside(offsets[i], std::uint64_t(table.rank_stride) * 4, total)) return PackStatus::out_of_bounds;
-        for (std::uint32_t r = 0; r < table.rank_stride; ++r) {
+        if (!inside(offsets[i], std::uint64_t(counts[i]) * 4, total)) return PackStatus::out_of_bounds;
+        for (std::uint32_t r = 0; r < counts[i]; ++r) {
             const float value = load<float>(view.bytes + offsets[i] + 4 * r);
             if (!finite(value)) return PackStatus::bad_number;
             sum[i] += std::abs(value);

@@ -73,7 +73,7 @@ TEST_CASE("holding an unfolded lobe at 0 hides no NaN", "[bcsdf]") {
     near_field(fibre, 0.3f, 0.4f, near);
     AzimuthalPoint azimuthal = near.point;
     CHECK(tables->azimuthal_density(azimuthal, 0.5f) > 0);
-    azimuthal.inverse_integral = nan;
+    azimuthal.sigma = Four(nan);
     CHECK(std::isnan(tables->azimuthal_density(azimuthal, 0.5f)));
     LongitudinalPoint longitudinal = tables->longitudinal_at(0.3f);
     CHECK(tables->longitudinal_density(longitudinal, 0.2f).back > 0);
@@ -187,12 +187,16 @@ TEST_CASE("a batch of exits is its exits one by one", "[bcsdf]") {
             S[count].value[0] = 42;
             eval(near, count, theta_r, phi, S);
             CHECK(S[count].value[0] == 42);
-            for (int k = 0; k < count; ++k) {
-                const Colour<3> one = near.eval(theta_r[k], phi[k]);
-                // The same sums in another order, and 1 / cos^2 as a factor: some ten roundings of 6e-8.
+            Colour<3> one[count];
+            float most = 0;
+            for (int k = 0; k < count; ++k)
+                one[k] = near.eval(theta_r[k], phi[k]), most = std::max(most, one[k].value[0]);
+            for (int k = 0; k < count; ++k)
+                // The same sums in another order, and 1 / cos^2 as a factor: some ten roundings of 6e-8. Weights, whose
+                // products are fused for one exit and not in a batch, are off by that too: of a lobe at its brightest.
                 for (int c = 0; c < 3; ++c)
-                    CHECK(double(S[k].value[c]) == Approx(double(one.value[c])).epsilon(2e-6).margin(1e-12));
-            }
+                    CHECK(double(S[k].value[c]) ==
+                          Approx(double(one[k].value[c])).epsilon(2e-6).margin(1e-12 + 1e-7 * double(most)));
         }
     }
 }

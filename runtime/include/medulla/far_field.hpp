@@ -395,11 +395,9 @@ MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, floa
     for (int i = 0; i < far.nodes; ++i) {
         const ScatteringNode<Channels>& n = far.node[i];
         if (unfolded != nullptr) {
-            const AzimuthalPoint at = unfolded->azimuthal_at(far.near.longitudinal.sigma_point, n.offset);
-            float D[2];
-            unfolded->azimuthal_densities(at, n.side * (phi - n.centre[0]), n.side * (phi - n.centre[1]), D);
-            for (int p = 0; p < 2; ++p)
-                for (int c = 0; c < Channels; ++c) N[p][c] += n.A[p][c] * D[p];
+            const TwoDensities D = azimuthal_densities(*unfolded, far.near.longitudinal.sigma_point, n.offset,
+                                                       n.side * (phi - n.centre[0]), n.side * (phi - n.centre[1]));
+            for (int c = 0; c < Channels; ++c) N[0][c] += n.A[0][c] * D.TTs, N[1][c] += n.A[1][c] * D.TRTs;
             continue;
         }
         contract_axis(table.view, table.last_axis, last_point(table, n.offset), far.sigma_weight, contraction.weight);

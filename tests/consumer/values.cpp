@@ -6,17 +6,16 @@
 
 using namespace medulla;
 
-// Not on WebAssembly's stack of 64 KB.
 static UnfoldedTables tables;
-static FurFibre<2> fibre, unfolded;
 
 int main() {
     const OpenResult opened = open_pack(default_pack_words, default_pack_size);
     if (opened.status != PackStatus::ok) return 1;
     const auto print = [](float x) { std::printf("%.7e\n", double(x)); };
     for (const FurPreset& preset : fur_presets) {
+        FurFibre<2> fibre;
         if (prepare(parameters_of<2>(preset), opened.pack, fibre) != FurStatus::ok) return 1;
-        unfolded = fibre;
+        FurFibre<2> unfolded = fibre;
         if (!unfold(unfolded, tables)) return 1;
         for (float theta_i : {-1.2f, 0.3f}) {
             NearField<2> near;

@@ -150,7 +150,7 @@ inline constexpr float widest_root_range = 1.4f;
 
 /// How far from 1 a spline coefficient's integral over phi may be, for all of them to be divided by it: that moves a
 /// lobe by the difference between neighbours times what the lobe changes between them (default pack: 8e-4, and 3e-6).
-inline constexpr float most_imbalance = 1e-2f;
+inline constexpr double most_imbalance = 1e-2;
 
 /// Spans of theta_i next to 90 degrees that unfolding halves: there alone sigma and the lobes change fast enough that
 /// the cubic between the pack's own breakpoints errs by more than 1e-5 (by 1e-4 to 5e-4).
@@ -191,22 +191,27 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
         return false;
 
     const float chebyshev[4] = {0.03806023f, 0.30865828f, 0.69134172f, 0.96193977f};  // nodes on [0, 1]
-    tables.least_root = low, tables.inverse_range = high > low ? 1 / (high - low) : 0;
+    tables.middle_root = 0.5f * (low + high), tables.inverse_range = high > low ? 1 / (high - low) : 0;
     tables.sigma_weights = cubic_weights(1, [&](float t) { return lagrange_weights(chebyshev, t); });
+    double share[most_exit_spans + 3];  // of an exit's row in the integral
+    tables.azimuth.integrate(phi, share);
     Contraction at_sigma, at;
     for (std::uint32_t s = 0; s < 4; ++s) {
         const float root = low + chebyshev[s] * (high - low);
         contract_axis(around.view, around.sigma_axis, root * root, around.weight, at_sigma.weight);
         for (std::uint32_t j = 0; j < offset.spans + 3; ++j) {
             scale_by_row(around.view, around.last_axis, j, at_sigma.weight, at.weight);
-            const float integral = detail::exit_integral(around.view, at.weight);
-            if (!(magnitude(integral - 1) < most_imbalance)) return false;
             float* to = tables.azimuthal + std::size_t(j) * 8 * tables.azimuth_rows + s;
+            double integral = 0;
             detail::exit_coefficients(around.view, at.weight, [&](std::uint32_t k, float positive, float negative) {
-                to[4 * k] = positive / integral, to[4 * (tables.azimuth_rows + k)] = negative / integral;
+                to[4 * k] = positive, to[4 * (tables.azimuth_rows + k)] = negative;
+                integral += share[k] * (double(positive) + double(negative));
             });
+            if (!(std::abs(integral - 1) < most_imbalance)) return false;
+            for (std::uint32_t k = 0; k < 2 * tables.azimuth_rows; ++k) to[4 * k] = float(double(to[4 * k]) / integral);
         }
     }
+    tables.longitude.integrate(theta_r, share);
     const std::uint32_t rows = tables.longitude_rows;
     for (std::uint32_t j = 0; j < nodes; ++j) {
         const float theta_i = from_spline_coordinate(Quantity::theta_i, node[j]);
@@ -214,14 +219,17 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
             const MaterialTable& table = side == 0 ? back : forward;
             contract(table, sigma_at(std::cos(theta_i)), theta_i, at);
             float* to = tables.longitudinal + std::size_t(j) * 4 * rows + side;
+            double integral = 0;
             detail::exit_coefficients(table.view, at.weight, [&](std::uint32_t k, float positive, float negative) {
                 to[2 * k] = positive, to[2 * (rows + k)] = negative;
+                integral += share[k] * (double(positive) + double(negative));
             });
             // The lobe is held to >= 0 as it is read: what lies below counts as light, so that its integral is 1.
-            const float below = detail::dips(
-                theta_r, [&](std::uint32_t k, std::uint32_t negative) { return to[2 * (rows * negative + k)]; });
-            const float factor = at.inverse_integral / (1 + below * at.inverse_integral);
-            for (std::uint32_t k = 0; k < 2 * rows; ++k) to[2 * k] *= factor;
+            integral += double(detail::dips(
+                theta_r, [&](std::uint32_t k, std::uint32_t negative) { return to[2 * (rows * negative + k)]; }));
+            // A signed low-rank sum with no positive integral is no density: it has no light to give.
+            const double factor = integral > 1e-30 && integral < 1e30 ? 1 / integral : 0;
+            for (std::uint32_t k = 0; k < 2 * rows; ++k) to[2 * k] = float(factor * double(to[2 * k]));
         }
     }
     fibre.tables = &tables;

@@ -70,7 +70,8 @@ MEDULLA_WIDE inline __m256 wide_blend(const WideRows& w, const float* row, std::
 MEDULLA_WIDE inline __m128 wide_azimuthal(const UnfoldedTables& tables, const float* rows, const WideRows& offset,
                                           __m256 sigma, const WidePlaces& places, int i) noexcept {
     const std::uint32_t exit = tables.azimuth.start[places.stretch[i]];
-    const __m128 w = wide_weights(tables.azimuth.weights[exit], Four(places.place[i]) - Four(tables.azimuth.low[exit]));
+    const __m128 w =
+        wide_weights(tables.azimuth.weights[exit], Four(places.place[i]) - Four(tables.azimuth.middle[exit]));
     const __m256 lower = _mm256_mul_ps(lanes_of(w, _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1)), sigma);
     const __m256 upper = _mm256_mul_ps(lanes_of(w, _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3)), sigma);
     const float* row = rows + 4 * std::size_t(places.half[i] + exit);
@@ -119,7 +120,7 @@ MEDULLA_WIDE inline ScatteredDensities wide_exit(const UnfoldedTables& tables, c
                                wide_azimuthal(tables, around.rows, offset, sigma, places, 1));
     const std::uint32_t exit = tables.longitude.start[places.stretch[2]];
     const __m128 w =
-        wide_weights(tables.longitude.weights[exit], Four(places.place[2]) - Four(tables.longitude.low[exit]));
+        wide_weights(tables.longitude.weights[exit], Four(places.place[2]) - Four(tables.longitude.middle[exit]));
     const float* row = along.rows + 2 * std::size_t(places.half[2] + exit);
     const __m256 sides = wide_blend(wide_rows(along.weight.v), row, 4 * std::size_t(tables.longitude_rows));
     const __m128 M = sum_of_halves(_mm256_mul_ps(lanes_of(w, _mm256_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3)), sides));

@@ -33,15 +33,15 @@ struct RowPoint {
     Four weight;
 };
 
-/// A span of an axis and how far along it [stretches].
+/// A span of an axis and the place from its middle [stretches].
 struct AxisPlace {
     std::uint32_t span;
     Four along;  ///< the same in every lane, as a processor has it ready for the weights
 };
 
-/// Four weights that are cubics in t in [0, 1], or in a place in [0, length]: read, not recomputed.
+/// Four weights that are cubics in a place, counted from the middle so that little rounds: read, not recomputed.
 struct CubicWeights {
-    alignas(64) float power[4][4];  ///< [power of t][row]: a cache line
+    alignas(64) float power[4][4];  ///< [power of the place][row]: a cache line
 
     /// @param x the same in every lane
     MEDULLA_HOT Four at(Four x) const noexcept {
@@ -50,8 +50,8 @@ struct CubicWeights {
     }
 };
 
-/// From the weights at t = 0, 1/3, 2/3, 1 (Newton's forward differences), whose sum is 1: so is that of the result, to
-/// the rounding of its coefficients. @param length what t = 1 stands for  @param f four weights at t
+/// From the weights at t = 0, 1/3, 2/3, 1, whose sum is 1: so is that of the result, to the rounding of its
+/// coefficients. @param length so much of the place is t = 0 to 1  @param f four weights at t
 template <class F>
 MEDULLA_FN CubicWeights cubic_weights(double length, F&& f) noexcept {
     SplineWeights<float> at[4];
@@ -61,8 +61,8 @@ MEDULLA_FN CubicWeights cubic_weights(double length, F&& f) noexcept {
     int largest = 0;
     for (int r = 0; r < 4; ++r) {
         const double a = double(at[0].w[r]), b = double(at[1].w[r]), d = double(at[2].w[r]), e = double(at[3].w[r]);
-        const double power[4] = {a, 9 * (b - d) + e - 5.5 * a + 4.5 * d, 4.5 * (2 * a - 5 * b + 4 * d - e),
-                                 4.5 * (3 * (b - d) + e - a)};
+        const double power[4] = {(9 * (b + d) - (a + e)) / 16, (27 * (d - b) - (e - a)) / 8, 2.25 * ((a + e) - (b + d)),
+                                 4.5 * ((e - a) - 3 * (d - b))};
         double scale = 1;
         for (int k = 0; k < 4; ++k, scale /= length)
             c.power[k][r] = float(power[k] * scale), excess[k] += double(c.power[k][r]);
@@ -83,7 +83,7 @@ MEDULLA_FN SplineWeights<float> lagrange_weights(const float (&x)[4], float at) 
     return w;
 }
 
-/// An axis of a pack, from 0, with the weights of each of its spans, cubics in the distance from its beginning
+/// An axis of a pack, from 0, with the weights of each of its spans, cubics in the distance from its middle
 /// [stretches]. Even stretches say which span a value lies in: where a breakpoint is not the end of one (those of exits
 /// are, being whole bins apart), the nearest end stands in for it. The cubics of two neighbours differ by the cube of
 /// what that is off, at most a 32nd of a span (default pack: 1e-8 of a lobe).
@@ -92,7 +92,7 @@ struct CubicAxis {
     std::uint32_t spans = 0;
     std::int32_t stretches = 0;
     float scale, end;                        ///< stretches / upper end of the axis; stretches
-    float low[Most];                         ///< where a span begins [stretches]
+    float middle[Most];                      ///< of a span [stretches]
     std::uint8_t first[Most];                ///< of a span's four rows
     std::uint8_t start[most_stretches + 1];  ///< the span at the middle of the stretch; one more for the upper end
     CubicWeights weights[Most];
@@ -123,7 +123,7 @@ struct CubicAxis {
     MEDULLA_HOT AxisPlace place(Four x) const noexcept {
         const Four u = lesser(x * Four(scale), Four(end));
         const std::uint32_t i = start[std::uint32_t(whole(u))];
-        return {i, u - Four(low[i])};
+        return {i, u - Four(middle[i])};
     }
     MEDULLA_HOT RowPoint at(Four x) const noexcept {
         const AxisPlace p = place(x);
@@ -132,7 +132,20 @@ struct CubicAxis {
     /// The same of a spline. @param u a place [stretches] on the axis, in stretch `stretch`
     MEDULLA_HOT RowPoint at(std::int32_t stretch, float u) const noexcept {
         const std::uint32_t i = start[std::uint32_t(stretch)];
-        return {i, weights[i].at(Four(u) - Four(low[i]))};
+        return {i, weights[i].at(Four(u) - Four(middle[i]))};
+    }
+
+    /// Integral over a spline's axis of what each row is weighted by [the axis's unit].
+    MEDULLA_FN void integrate(const AxisView<float>& axis, double (&rows)[Most + 3]) const noexcept {
+        for (double& row : rows) row = 0;
+        for (std::uint32_t i = 0; i < spans; ++i) {
+            const auto k = std::int32_t(i);
+            const double width = double(axis.breakpoint(k + 1)) - double(axis.breakpoint(k)),
+                         length = width * double(scale);
+            for (std::uint32_t r = 0; r < 4; ++r)
+                rows[i + r] +=
+                    width * (double(weights[i].power[0][r]) + length * length / 12 * double(weights[i].power[2][r]));
+        }
     }
 
   private:
@@ -155,9 +168,9 @@ struct CubicAxis {
         for (std::uint32_t i = 0; i < spans; ++i) {
             const float a = breakpoint(i), b = breakpoint(i + 1), length = (b - a) * scale;
             if (!(length > narrowest)) return false;
-            low[i] = a * scale;
+            middle[i] = 0.5f * (a + b) * scale;
             weights[i] = weights_of(i, a, b, length);
-            for (const float next = low[i] + length; from < stretches && float(from) + 0.5f < next; ++from)
+            for (const float next = b * scale; from < stretches && float(from) + 0.5f < next; ++from)
                 start[from] = static_cast<std::uint8_t>(i);
         }
         while (from <= stretches) start[from++] = static_cast<std::uint8_t>(spans - 1);
@@ -205,7 +218,7 @@ MEDULLA_HOT ExitPlaces exit_places(Four turns, Four scale) noexcept {
 
 /// The tables of one material, 153 KB in memory that the caller keeps for as long as the fibre that reads them.
 struct UnfoldedTables {
-    float least_root = 0, inverse_range = 0;  ///< sqrt(sigma) runs over [least_root, least_root + 1 / inverse_range]
+    float middle_root = 0, inverse_range = 0;  ///< of the range of sqrt(sigma), 1 / its length
     std::uint32_t azimuth_rows = 0, longitude_rows = 0;
     float azimuth_scale = 0, longitude_scale = 0;  ///< stretches per turn
     CubicWeights sigma_weights;                    ///< of four Chebyshev nodes in it
@@ -226,8 +239,8 @@ struct UnfoldedTables {
         return true;
     }
     MEDULLA_HOT Four sigma_place(float sigma) const noexcept {
-        const Four t = (square_root(Four(sigma)) - Four(least_root)) * Four(inverse_range);
-        return lesser(greater(t, Four(0.0f)), Four(1.0f));
+        const Four t = (square_root(Four(sigma)) - Four(middle_root)) * Four(inverse_range);
+        return lesser(greater(t, Four(-0.5f)), Four(0.5f));
     }
     MEDULLA_HOT Four sigma_at(float sigma) const noexcept { return sigma_weights.at(sigma_place(sigma)); }
     /// @param sigma what sigma_at gave  @param h offset [medulla radii], in [0, 1]
@@ -294,17 +307,5 @@ struct UnfoldedTables {
         return {0.0f > back ? 0.0f : back, 0.0f > forward ? 0.0f : forward};
     }
 };
-
-namespace detail {
-
-/// integral over y of the contracted lobe.
-MEDULLA_FN float exit_integral(const TableView& view, const float* weight) noexcept {
-    float sum = 0;
-    for (std::uint32_t r = 0; r < view.even_stride(); ++r)
-        sum += weight[r] * load<float>(view.bytes + view.layout.integrals_offset + 4 * r);
-    return sum;
-}
-
-}  // namespace detail
 
 }  // namespace medulla

@@ -159,8 +159,6 @@ MEDULLA_FN Four power_of_two(Four k) noexcept {
 MEDULLA_FN bool any(FourMask mask) noexcept { return mask.v[0] || mask.v[1] || mask.v[2] || mask.v[3]; }
 MEDULLA_FN Four four_at(const float* x) noexcept { return Four(x[0], x[1], x[2], x[3]); }
 MEDULLA_FN Four aligned_four_at(const float* x) noexcept { return four_at(x); }
-/// The whole part of lane 0, below 2^31.
-MEDULLA_FN std::int32_t whole(Four a) noexcept { return std::int32_t(a.v[0]); }
 MEDULLA_FN void store_four(Four a, float* x) noexcept {
     for (int i = 0; i < 4; ++i) x[i] = a.v[i];
 }
@@ -190,6 +188,13 @@ MEDULLA_FN float lane(Four a, int i) noexcept { return a.v[i]; }
 MEDULLA_FN float sum_of(Four a) noexcept { return (a.v[0] + a.v[2]) + (a.v[1] + a.v[3]); }
 #endif
 
+/// One number, kept as a vector processor wants it for products with four others: in every lane.
+#if defined(MEDULLA_SSE2)
+using Same = Four;
+#else
+using Same = float;
+#endif
+
 /// A constant as one number or as four.
 template <class T>
 struct Constant {
@@ -206,6 +211,8 @@ MEDULLA_FN T choose(bool condition, T yes, T no) noexcept {
     return condition ? yes : no;
 }
 MEDULLA_FN float greater(float a, float b) noexcept { return a > b ? a : b; }
+MEDULLA_FN float lesser(float a, float b) noexcept { return a < b ? a : b; }
+MEDULLA_FN std::int32_t whole(float a) noexcept { return std::int32_t(a); }
 MEDULLA_FN float zero_where(bool condition, float a) noexcept { return condition ? 0.0f : a; }
 template <class T>
 MEDULLA_FN T square_root(T a) noexcept {

@@ -38,7 +38,7 @@ MEDULLA_WIDE inline WidePlaces wide_places(Four y, Four scale, __m128i rows) noe
                     _mm_and_si128(_mm_srai_epi32(_mm_castps_si128(turns.v), 31), rows));
     return p;
 }
-MEDULLA_WIDE inline __m128 wide_weights(const CubicWeights& w, Four x) noexcept {
+MEDULLA_WIDE inline __m128 wide_weights(const CubicWeights& w, Same x) noexcept {
     const __m128 t = x.v, a = _mm_fmadd_ps(t, _mm_load_ps(w.power[1]), _mm_load_ps(w.power[0])),
                  b = _mm_fmadd_ps(t, _mm_load_ps(w.power[3]), _mm_load_ps(w.power[2]));
     return _mm_fmadd_ps(_mm_mul_ps(t, t), b, a);
@@ -71,7 +71,7 @@ MEDULLA_WIDE inline __m128 wide_azimuthal(const UnfoldedTables& tables, const fl
                                           __m256 sigma, const WidePlaces& places, int i) noexcept {
     const std::uint32_t exit = tables.azimuth.start[places.stretch[i]];
     const __m128 w =
-        wide_weights(tables.azimuth.weights[exit], Four(places.place[i]) - Four(tables.azimuth.middle[exit]));
+        wide_weights(tables.azimuth.weights[exit], Same(places.place[i]) - Same(tables.azimuth.middle[exit]));
     const __m256 lower = _mm256_mul_ps(lanes_of(w, _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1)), sigma);
     const __m256 upper = _mm256_mul_ps(lanes_of(w, _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3)), sigma);
     const float* row = rows + 4 * std::size_t(places.half[i] + exit);
@@ -99,11 +99,11 @@ MEDULLA_WIDE inline TwoDensities wide_lookup(const UnfoldedTables& tables, const
 }
 MEDULLA_WIDE inline TwoDensities wide_lookup(const UnfoldedTables& tables, Four sigma, float h, float y0,
                                              float y1) noexcept {
-    return wide_lookup(tables, tables.offset.place(chord_coordinate(Four(h))), sigma.v, y0, y1);
+    return wide_lookup(tables, tables.offset.place(chord_coordinate(Same(h))), sigma.v, y0, y1);
 }
 MEDULLA_WIDE inline TwoDensities wide_lookup(const UnfoldedTables& tables, float sigma, float h, float y0,
                                              float y1) noexcept {
-    const AxisPlace at = tables.offset.place(chord_coordinate(Four(h)));  // first, as it takes longest
+    const AxisPlace at = tables.offset.place(chord_coordinate(Same(h)));  // first, as it takes longest
     return wide_lookup(tables, at, wide_weights(tables.sigma_weights, tables.sigma_place(sigma)), y0, y1);
 }
 
@@ -120,7 +120,7 @@ MEDULLA_WIDE inline ScatteredDensities wide_exit(const UnfoldedTables& tables, c
                                wide_azimuthal(tables, around.rows, offset, sigma, places, 1));
     const std::uint32_t exit = tables.longitude.start[places.stretch[2]];
     const __m128 w =
-        wide_weights(tables.longitude.weights[exit], Four(places.place[2]) - Four(tables.longitude.middle[exit]));
+        wide_weights(tables.longitude.weights[exit], Same(places.place[2]) - Same(tables.longitude.middle[exit]));
     const float* row = along.rows + 2 * std::size_t(places.half[2] + exit);
     const __m256 sides = wide_blend(wide_rows(along.weight.v), row, 4 * std::size_t(tables.longitude_rows));
     const __m128 M = sum_of_halves(_mm256_mul_ps(lanes_of(w, _mm256_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3)), sides));

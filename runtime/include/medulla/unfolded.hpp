@@ -22,9 +22,9 @@ MEDULLA_HOT Four turns_of(Four y) noexcept {
 }
 
 /// spline_coordinate of an offset, or of an inclination over pi/2; x in [0, 1] but for rounding.
-MEDULLA_HOT Four chord_coordinate(Four x) noexcept {
-    const Four one(1.0f);
-    return x / (one + square_root(greater(one - x, Four(0.0f)) * (one + x)));
+MEDULLA_HOT Same chord_coordinate(Same x) noexcept {
+    const Same one(1.0f);
+    return x / (one + square_root(greater(one - x, Same(0.0f)) * (one + x)));
 }
 
 /// Four neighbouring rows of an axis and their weights.
@@ -36,15 +36,14 @@ struct RowPoint {
 /// A span of an axis and the place from its middle [stretches].
 struct AxisPlace {
     std::uint32_t span;
-    Four along;  ///< the same in every lane, as a processor has it ready for the weights
+    Same along;
 };
 
 /// Four weights that are cubics in a place, counted from the middle so that little rounds: read, not recomputed.
 struct CubicWeights {
     alignas(64) float power[4][4];  ///< [power of the place][row]: a cache line
 
-    /// @param x the same in every lane
-    MEDULLA_HOT Four at(Four x) const noexcept {
+    MEDULLA_HOT Four at(Same x) const noexcept {
         return (aligned_four_at(power[0]) + x * aligned_four_at(power[1])) +
                (x * x) * (aligned_four_at(power[2]) + x * aligned_four_at(power[3]));
     }
@@ -119,20 +118,20 @@ struct CubicAxis {
                 return cubic_weights(double(length), [&](float t) { return lagrange_weights(x, a + t * (b - a)); });
             });
     }
-    /// The span of a spline coordinate, the same in every lane, >= 0; beyond the axis, as for a NaN, its end holds.
-    MEDULLA_HOT AxisPlace place(Four x) const noexcept {
-        const Four u = lesser(x * Four(scale), Four(end));
+    /// The span of a spline coordinate >= 0; beyond the axis, as for a NaN, its end holds.
+    MEDULLA_HOT AxisPlace place(Same x) const noexcept {
+        const Same u = lesser(x * Same(scale), Same(end));
         const std::uint32_t i = start[std::uint32_t(whole(u))];
-        return {i, u - Four(middle[i])};
+        return {i, u - Same(middle[i])};
     }
-    MEDULLA_HOT RowPoint at(Four x) const noexcept {
+    MEDULLA_HOT RowPoint at(Same x) const noexcept {
         const AxisPlace p = place(x);
         return {first[p.span], weights[p.span].at(p.along)};
     }
     /// The same of a spline. @param u a place [stretches] on the axis, in stretch `stretch`
     MEDULLA_HOT RowPoint at(std::int32_t stretch, float u) const noexcept {
         const std::uint32_t i = start[std::uint32_t(stretch)];
-        return {i, weights[i].at(Four(u) - Four(middle[i]))};
+        return {i, weights[i].at(Same(u) - Same(middle[i]))};
     }
 
     /// Integral over a spline's axis of what each row is weighted by [the axis's unit].
@@ -238,14 +237,14 @@ struct UnfoldedTables {
         azimuth_scale = 2 * azimuth.end, longitude_scale = 4 * longitude.end;
         return true;
     }
-    MEDULLA_HOT Four sigma_place(float sigma) const noexcept {
-        const Four t = (square_root(Four(sigma)) - Four(middle_root)) * Four(inverse_range);
-        return lesser(greater(t, Four(-0.5f)), Four(0.5f));
+    MEDULLA_HOT Same sigma_place(float sigma) const noexcept {
+        const Same t = (square_root(Same(sigma)) - Same(middle_root)) * Same(inverse_range);
+        return lesser(greater(t, Same(-0.5f)), Same(0.5f));
     }
     MEDULLA_HOT Four sigma_at(float sigma) const noexcept { return sigma_weights.at(sigma_place(sigma)); }
     /// @param sigma what sigma_at gave  @param h offset [medulla radii], in [0, 1]
     MEDULLA_HOT AzimuthalPoint azimuthal_at(Four sigma, float h) const noexcept {
-        const RowPoint row = offset.at(chord_coordinate(Four(h)));
+        const RowPoint row = offset.at(chord_coordinate(Same(h)));
         return {azimuthal + std::size_t(row.first) * 8 * azimuth_rows, row.weight, sigma};
     }
     /// Where exit i lies among an azimuthal point's rows.
@@ -283,7 +282,7 @@ struct UnfoldedTables {
     }
     /// @param theta_i [radians], in [0, pi/2]
     MEDULLA_HOT LongitudinalPoint longitudinal_at(float theta_i) const noexcept {
-        const RowPoint row = inclination.at(chord_coordinate(Four(theta_i * float(2 / pi))));
+        const RowPoint row = inclination.at(chord_coordinate(Same(theta_i * float(2 / pi))));
         return {longitudinal + std::size_t(row.first) * 4 * longitude_rows, row.weight};
     }
     /// Densities per radian at an exit, >= 0.

@@ -113,10 +113,9 @@ void bench_lookups(const PackView& pack, const std::string& label, UnfoldedTable
            "ns");
     report("lookup, half of contracting and two angles, unfolded, rank " + rank,
            0.5 * time([&](const Query& x) {
-               const AzimuthalPoint here = tables.azimuthal_at(tables.sigma_at(2.2f + 0.1f * x.theta_i), std::abs(x.h));
-               float N[2];
-               tables.azimuthal_densities(here, x.phi, x.theta_r, N);
-               return N[0] + N[1];
+               const TwoDensities N =
+                   azimuthal_densities(tables, 2.2f + 0.1f * x.theta_i, std::abs(x.h), x.phi, x.theta_r);
+               return N.TTs + N.TRTs;
            }),
            "ns", std::sqrt(error / norm));
 }

@@ -6,6 +6,8 @@
 
 using namespace medulla;
 
+static UnfoldedTables tables;
+
 int main() {
     const OpenResult opened = open_pack(default_pack_words, default_pack_size);
     if (opened.status != PackStatus::ok) return 1;
@@ -13,6 +15,8 @@ int main() {
     for (const FurPreset& preset : fur_presets) {
         FurFibre<2> fibre;
         if (prepare(parameters_of<2>(preset), opened.pack, fibre) != FurStatus::ok) return 1;
+        FurFibre<2> unfolded = fibre;
+        if (!unfold(unfolded, tables)) return 1;
         for (float theta_i : {-1.2f, 0.3f}) {
             NearField<2> near;
             near_field(fibre, theta_i, 0.4f, near);
@@ -25,6 +29,9 @@ int main() {
             for (float phi : {0.5f, -2.8f}) {
                 const Colour<2> n = near.eval(0.1f - theta_i, phi), f = far.eval(0.1f - theta_i, phi);
                 for (int c = 0; c < 2; ++c) print(n.value[c]), print(f.value[c]);
+                const Colour<2> m = eval(unfolded, theta_i, 0.1f - theta_i, phi, 0.4f),
+                                g = eval(unfolded, theta_i, 0.1f - theta_i, phi, OffsetRange{});
+                for (int c = 0; c < 2; ++c) print(m.value[c]), print(g.value[c]);
                 print(near_sampler.pdf(0.1f - theta_i, phi)), print(far_sampler.pdf(0.1f - theta_i, phi));
             }
             const RandomNumbers u = {0.6f, 0.3f, 0.7f, 0.2f, 0.5f};

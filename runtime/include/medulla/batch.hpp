@@ -22,10 +22,9 @@ struct ExitRows {
     MEDULLA_FN void set(const NearField<Channels>& near) noexcept {
         const UnfoldedTables& tables = *near.fibre->tables;
         const AzimuthalPoint& p = near.point;
-        const Four sigma = p.sigma * Four(p.inverse_integral);
-        const Four w0 = spread<0>(p.offset) * sigma, w1 = spread<1>(p.offset) * sigma, w2 = spread<2>(p.offset) * sigma,
-                   w3 = spread<3>(p.offset) * sigma;
-        const std::uint32_t rows = 2 * tables.azimuth_rows(), step = 4 * rows;
+        const Four w0 = spread<0>(p.offset) * p.sigma, w1 = spread<1>(p.offset) * p.sigma,
+                   w2 = spread<2>(p.offset) * p.sigma, w3 = spread<3>(p.offset) * p.sigma;
+        const std::uint32_t rows = 2 * tables.azimuth_rows, step = 4 * rows;
         for (std::uint32_t k = 0; k < rows; k += 4) {
             Four at[4];
             for (std::uint32_t i = 0; i < 4; ++i) {
@@ -38,7 +37,7 @@ struct ExitRows {
         }
         const LongitudinalPoint& m = near.longitudinal.point;
         const Four w[4] = {spread<0>(m.weight), spread<1>(m.weight), spread<2>(m.weight), spread<3>(m.weight)};
-        const std::uint32_t length = 4 * tables.longitude_rows();
+        const std::uint32_t length = 4 * tables.longitude_rows;
         for (std::uint32_t k = 0; k < length; k += 4) {
             const float* r = m.rows + k;
             store_four((w[0] * four_at(r) + w[1] * four_at(r + length)) +
@@ -51,7 +50,7 @@ struct ExitRows {
         Four at[4];
         for (int i = 0; i < 4; ++i) {
             const RowPoint exit = tables.azimuth.at(places.stretch[i], places.place[i]);
-            at[i] = exit.weight * four_at(azimuthal + exit.first + tables.azimuth_rows() * (places.below >> i & 1u));
+            at[i] = exit.weight * four_at(azimuthal + exit.first + tables.azimuth_rows * (places.below >> i & 1u));
         }
         transpose(at[0], at[1], at[2], at[3]);
         return greater((at[0] + at[1]) + (at[2] + at[3]), Four(0.0f));
@@ -97,8 +96,8 @@ struct NearBatch {
             const Four azimuth = four_at(phi + 4 * i), theta = four_at(theta_r + 4 * i);
             for (int p = 0; p < 2; ++p)
                 around[p][i] = exit_places(turns_of(Four(near.side) * (azimuth - Four(near.centre[3 + p]))),
-                                           Four(tables.azimuth_scale()));
-            along[i] = exit_places(turns_of(m.theta_i < 0 ? -theta : theta), Four(tables.longitude_scale()));
+                                           Four(tables.azimuth_scale));
+            along[i] = exit_places(turns_of(m.theta_i < 0 ? -theta : theta), Four(tables.longitude_scale));
             forwardness[i] = Four(2.0f) * magnitude(turns_of(azimuth));
         }
         for (int i = 0; i < fours; ++i) {

@@ -148,34 +148,40 @@ MEDULLA_FN float medulla_angle(const FarField<Channels>& far, float gamma) noexc
     return real_math::angle(t, std::sqrt((1 - t) * (1 + t)));
 }
 
-/// Sum over the nodes of [a, b] in gamma_i of weight * visit(path at h), `inside` the medulla or not.
+/// Gauss rule for `deviations` of a Gaussian under one piece of `length` [radians]: errors of 1e-5 and less
+/// (docs/bcsdf.md). A long piece sees the amplitude fall to 0 at the fibre's rim.
+MEDULLA_FN int rule_for(float deviations, float length) noexcept {
+    const int amplitude = length < 1.2f ? 0 : (length < 2.4f ? 1 : 2);
+    const int gaussian = deviations < 6 ? 0 : (deviations < 10 ? 1 : (deviations < 14 ? 2 : 3));
+    return amplitude > gaussian ? amplitude : gaussian;
+}
+
+/// Sum over the nodes of [a, b] in gamma_i of weight * visit(path at h), for lobe p.
+/// @param density most deviations of the lobe's Gaussian per radian of gamma_i
 template <int Channels, class Visit>
-MEDULLA_FN void integrate_piece(const FarField<Channels>& far, float a, float b, int rule_index,
+MEDULLA_FN void integrate_piece(const FarField<Channels>& far, int p, float a, float b, float density,
                                 Visit&& visit) noexcept {
-    const auto& p = far.fibre().parameters;
+    const auto& parameters = far.fibre().parameters;
     const auto& m = far.near.longitudinal;
-    // Inside the medulla and not so short that the ends' rounding in psi would show.
-    const bool inside = std::abs(a + b) < 2 * far.gamma_rim && far.rim < 1 && far.gamma_high - far.gamma_low > 0.01f;
+    const float length = b - a;
+    // Through the medulla (R sees none of it) and not so short that the ends' rounding in psi would show.
+    const bool inside =
+        p > 0 && std::abs(a + b) < 2 * far.gamma_rim && far.rim < 1 && far.gamma_high - far.gamma_low > 0.01f;
     if (inside) {
         a = medulla_angle(far, a), b = medulla_angle(far, b);
+        // Nodes are even in psi, so deviations count there: d gamma_i / d psi is greatest next to psi = 0.
+        const Offset<float> at = offset_inside(far.rim, a > 0 ? a : (b < 0 ? b : 0.0f));
+        density *= at.dh / at.cos_i;
     }
     const float middle = 0.5f * (a + b), half = 0.5f * (b - a);
-    const int index = rule_index + far.quality;
+    const int index = rule_for(density * (b - a), length) + far.quality;
     const GaussRule rule = gauss_rule(index < 0 ? 0 : (index >= gauss_rules ? gauss_rules - 1 : index));
     for (int j = 0; 2 * j < rule.half; ++j) {
         const Four t = rule_nodes(rule, j, middle, half);
         const Offset<Four> at = inside ? offset_inside(far.rim, t) : offset_at_angle(t);
-        visit(trace(m.at, p.kappa, p.layers, at.h, at.cos_i),
+        visit(trace(m.at, parameters.kappa, parameters.layers, at.h, at.cos_i),
               rule_weights(rule, j) * Four(half * far.inverse_width) * at.dh);
     }
-}
-
-/// Gauss rule for `deviations` of a Gaussian under one piece of `length` [radians]: errors of 3e-4 and less
-/// (docs/bcsdf.md). A long piece sees the amplitude fall to 0 at the fibre's rim.
-MEDULLA_FN int rule_for(float deviations, float length) noexcept {
-    const int amplitude = length < 1.2f ? 0 : (length < 2.4f ? 1 : 2);
-    const int gaussian = deviations < 7 ? 0 : (deviations < 12 ? 1 : (deviations < 19 ? 2 : 3));
-    return amplitude > gaussian ? amplitude : gaussian;
 }
 
 /// Calls visit(path, weight, D) for every four nodes in reach of phi for lobe p = 0, 1, 2: the average over the range
@@ -186,11 +192,7 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
     const WrappedGaussian<float>& gaussian = far.fibre().azimuthal_gaussian[p];
     const Cuts& cuts = far.cuts[p];
     const float s = gaussian.deviation, wide = reach * s;
-    const float whole = s > wide_deviation ? 1.0f : within_reach;
-    const auto node = [&](const Path<Four>& path, Four weight) {
-        visit(path, weight * Four(whole),
-              gaussian.pdf_of(Four(phi) - unscattered_centre(p, path.gamma_i, path.gamma_t)));
-    };
+    const auto centre = [p](const Path<Four>& path) { return unscattered_centre(p, path.gamma_i, path.gamma_t); };
     float a = cuts.gamma[0];
     Exit at_a = exit_of(p, at.inverse_index, at.index_excess, a);
     for (int i = 1; i < cuts.count; ++i) {
@@ -200,8 +202,9 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
         if (a < 0 && b > 0)
             slope = std::fmax(slope, std::abs(exit_of(p, at.inverse_index, at.index_excess, 0.0f).slope));
         if (s > wide_deviation) {
-            const int rule = rule_for(slope * (b - a) / s, b - a);
-            integrate_piece(far, a, b, rule, node);
+            integrate_piece(far, p, a, b, slope / s, [&](const Path<Four>& path, Four weight) {
+                visit(path, weight, gaussian.pdf_of(Four(phi) - centre(path)));
+            });
         } else {
             const float low = std::fmin(at_a.phi, at_b.phi), high = std::fmax(at_a.phi, at_b.phi);
             // Every whole turn by which phi - wide .. phi + wide can meet low .. high.
@@ -219,7 +222,12 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
                 const float sa = ga == a ? at_a.slope : exit_of(p, at.inverse_index, at.index_excess, ga).slope;
                 const float sb = gb == b ? at_b.slope : exit_of(p, at.inverse_index, at.index_excess, gb).slope;
                 const float steepest = ga < 0 && gb > 0 && p == 2 ? slope : std::fmax(std::abs(sa), std::abs(sb));
-                integrate_piece(far, ga, gb, rule_for(steepest * (gb - ga) / s, gb - ga), node);
+                // The image that is y alone: the others' tails are not within this reach of theirs.
+                integrate_piece(far, p, ga, gb, steepest / s, [&](const Path<Four>& path, Four weight) {
+                    const Four z = (Four(y) - centre(path)) * Four(gaussian.inverse);
+                    visit(path, weight,
+                          Four(within_reach * gaussian.peak) * real_math::exponential(Four(-0.5f) * z * z));
+                });
             }
         }
         a = b, at_a = at_b;
@@ -229,17 +237,27 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& far, int p, float ph
 /// Cuts of R, TT and TRT over [gamma_low, gamma_high].
 template <int Channels>
 MEDULLA_FN void place_cuts(FarField<Channels>& far) noexcept {
+    const FurParameters<Channels>& parameters = far.fibre().parameters;
     const Inclination<float>& at = far.near.longitudinal.at;
     const float low = far.gamma_low, high = far.gamma_high;
     Cuts cuts;
     const auto both = [&](float gamma) { cuts.insert(gamma, low, high), cuts.insert(-gamma, low, high); };
     const auto both_at = [&](float c) { both(real_math::angle(std::sqrt((1 - c) * (1 + c)), c)); };
-    // The cuticle's F changes over cos gamma_i ~ sqrt(eta'^2 - 1) as eta' -> 1, and ~ 1 / eta' as eta' -> infinity.
-    const float scale = std::fmin(std::sqrt(at.index_excess), at.inverse_index);
-    for (float c = 2 * scale; c < 0.7f; c *= 4) both_at(c);
-    if (far.rim < 1 && far.fibre().parameters.kappa > 0) both(far.gamma_rim);
+    // The cuticle's F changes over cos gamma_i ~ sqrt(eta'^2 - 1) as eta' -> 1, and ~ 1 / eta' as eta' -> infinity, and
+    // with few layers later.
+    const float few = std::fmin(1.0f, std::fmax(2 * parameters.layers, 0.0625f));
+    const float scale = std::fmin(std::sqrt(at.index_excess), at.inverse_index) * few;
+    for (float c = 2 * scale; c < 0.8f; c *= 4) both_at(c);
     cuts.insert(low, low - 1, high), cuts.insert(high, low, high + 1);
-    far.cuts[0] = far.cuts[1] = cuts;
+    far.cuts[0] = cuts;
+    if (far.rim < 1 && parameters.kappa > 0) both(far.gamma_rim);
+    // What a dense medulla lets through leaves next to its rim, over psi ~ 1 / tau.
+    const float tau = far.near.longitudinal.absorption.medulla_extinction * parameters.kappa;
+    if (tau > 4) {
+        const Offset<float> edge = offset_inside(far.rim, float(pi / 2) - 4 / tau);
+        both(real_math::angle(edge.h, edge.cos_i));
+    }
+    far.cuts[1] = cuts;
     // TRT is stationary where cos^2 gamma_i = (eta'^2 - 1) / 3.
     if (at.index_excess < 3) both_at(std::sqrt(at.index_excess / 3));
     far.cuts[2] = cuts;
@@ -296,8 +314,10 @@ MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
     const int index = (width > 0.1f ? 0 : 1) + far.quality;
     const GaussRule rule = gauss_rule(index < 0 ? 0 : index), edge = gauss_rule(1);
     const float tau = far.near.longitudinal.absorption.medulla_extinction * parameters.kappa;
-    // Where the medulla reaches the fibre's rim, F rises to 1 within cos gamma_i ~ sqrt(eta'^2 - 1), times few layers.
-    const float steep = std::sqrt(far.near.longitudinal.at.index_excess) * std::fmin(1.0f, 2 * parameters.layers);
+    // Where the medulla reaches the fibre's rim, F rises to 1 within the cos gamma_i that place_cuts grades by.
+    const Inclination<float>& at = far.near.longitudinal.at;
+    const float steep =
+        std::fmin(std::sqrt(at.index_excess), at.inverse_index) * std::fmin(1.0f, 2 * parameters.layers);
     const float rise = far.rim < 1 ? 4.0f : std::fmax(3 * steep, 0.01f), dense = tau > 4 ? 4 / tau : 4.0f;
     const float edge_width = std::fmin(rise, dense);
     float most = 0, low = a, high = b;
@@ -395,11 +415,9 @@ MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, floa
     for (int i = 0; i < far.nodes; ++i) {
         const ScatteringNode<Channels>& n = far.node[i];
         if (unfolded != nullptr) {
-            const AzimuthalPoint at = unfolded->azimuthal_at(far.near.longitudinal.sigma_point, n.offset);
-            float D[2];
-            unfolded->azimuthal_densities(at, n.side * (phi - n.centre[0]), n.side * (phi - n.centre[1]), D);
-            for (int p = 0; p < 2; ++p)
-                for (int c = 0; c < Channels; ++c) N[p][c] += n.A[p][c] * D[p];
+            const TwoDensities D = azimuthal_densities(*unfolded, far.near.longitudinal.sigma_point, n.offset,
+                                                       n.side * (phi - n.centre[0]), n.side * (phi - n.centre[1]));
+            for (int c = 0; c < Channels; ++c) N[0][c] += n.A[0][c] * D.TTs, N[1][c] += n.A[1][c] * D.TRTs;
             continue;
         }
         contract_axis(table.view, table.last_axis, last_point(table, n.offset), far.sigma_weight, contraction.weight);

@@ -11,6 +11,7 @@
 #include "medulla/gaussian.hpp"
 #include "medulla/lookup.hpp"
 #include "medulla/pack.hpp"
+#include "medulla/scattered_lookup.hpp"
 #include "medulla/unfolded.hpp"
 
 namespace medulla {
@@ -150,6 +151,10 @@ MEDULLA_FN FurStatus prepare(const FurParameters<Channels>& p, const PackView& p
 /// Widest range of sqrt(sigma), upper over lower end, that four nodes are enough for: eta >= 1.165.
 inline constexpr float widest_root_range = 1.4f;
 
+/// How far from 1 a spline coefficient's integral over phi may be, for all of them to be divided by it: that moves a
+/// lobe by the difference between neighbours times what the lobe changes between them (default pack: 8e-4, and 3e-6).
+inline constexpr double most_imbalance = 1e-2;
+
 /// Spans of theta_i next to 90 degrees that unfolding halves: there alone sigma and the lobes change fast enough that
 /// the cubic between the pack's own breakpoints errs by more than 1e-5 (by 1e-4 to 5e-4).
 inline constexpr std::uint32_t halved_spans = 5;
@@ -175,9 +180,8 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
     const float low = held(std::sqrt(sigma_at(1))), high = held(std::sqrt(sigma_at(0)));
     if (offset.spans > most_offset_spans || theta.spans < 3 || theta.spans + halved_spans > most_inclination_spans ||
         phi.spans > most_exit_spans || theta_r.spans > most_exit_spans || high > widest_root_range * low ||
-        low < sigma.lower() || theta.upper() < 1)
+        low < sigma.lower() || theta.upper() < 1 || !(offset.lower() == 0) || !(theta.lower() == 0))
         return false;
-    tables.offset.set_spline(offset);
     float node[most_inclination_spans + 1];
     std::uint32_t nodes = 0;
     for (std::uint32_t j = 0; j <= theta.spans; ++j) {
@@ -185,41 +189,50 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
         if (j + halved_spans > theta.spans) node[nodes] = 0.5f * (node[nodes - 1] + at), ++nodes;
         node[nodes++] = at;
     }
-    tables.inclination.set_nodes(nodes - 1, node);
-    tables.azimuth.set_spline(phi);
-    tables.longitude.set_spline(theta_r);
+    if (!tables.offset.set_spline(offset) || !tables.inclination.set_nodes(nodes - 1, node) ||
+        !tables.set_exits(phi, theta_r))
+        return false;
 
     const float chebyshev[4] = {0.03806023f, 0.30865828f, 0.69134172f, 0.96193977f};  // nodes on [0, 1]
-    tables.least_root = low, tables.inverse_range = high > low ? 1 / (high - low) : 0;
-    tables.sigma_weights = cubic_weights([&](float t) { return lagrange_weights(chebyshev, t); });
+    tables.middle_root = 0.5f * (low + high), tables.inverse_range = high > low ? 1 / (high - low) : 0;
+    tables.sigma_weights = cubic_weights(1, [&](float t) { return lagrange_weights(chebyshev, t); });
+    double share[most_exit_spans + 3];  // of an exit's row in the integral
+    tables.azimuth.integrate(phi, share);
     Contraction at_sigma, at;
     for (std::uint32_t s = 0; s < 4; ++s) {
         const float root = low + chebyshev[s] * (high - low);
         contract_axis(around.view, around.sigma_axis, root * root, around.weight, at_sigma.weight);
         for (std::uint32_t j = 0; j < offset.spans + 3; ++j) {
             scale_by_row(around.view, around.last_axis, j, at_sigma.weight, at.weight);
-            tables.integral[j][s] = detail::exit_integral(around.view, at.weight);
-            float* to = tables.azimuthal + std::size_t(j) * 8 * tables.azimuth_rows() + s;
+            float* to = tables.azimuthal + std::size_t(j) * 8 * tables.azimuth_rows + s;
+            double integral = 0;
             detail::exit_coefficients(around.view, at.weight, [&](std::uint32_t k, float positive, float negative) {
-                to[4 * k] = positive, to[4 * (tables.azimuth_rows() + k)] = negative;
+                to[4 * k] = positive, to[4 * (tables.azimuth_rows + k)] = negative;
+                integral += share[k] * (double(positive) + double(negative));
             });
+            if (!(std::abs(integral - 1) < most_imbalance)) return false;
+            for (std::uint32_t k = 0; k < 2 * tables.azimuth_rows; ++k) to[4 * k] = float(double(to[4 * k]) / integral);
         }
     }
-    const std::uint32_t rows = tables.longitude_rows();
+    tables.longitude.integrate(theta_r, share);
+    const std::uint32_t rows = tables.longitude_rows;
     for (std::uint32_t j = 0; j < nodes; ++j) {
         const float theta_i = from_spline_coordinate(Quantity::theta_i, node[j]);
         for (std::uint32_t side = 0; side < 2; ++side) {
             const MaterialTable& table = side == 0 ? back : forward;
             contract(table, sigma_at(std::cos(theta_i)), theta_i, at);
             float* to = tables.longitudinal + std::size_t(j) * 4 * rows + side;
+            double integral = 0;
             detail::exit_coefficients(table.view, at.weight, [&](std::uint32_t k, float positive, float negative) {
                 to[2 * k] = positive, to[2 * (rows + k)] = negative;
+                integral += share[k] * (double(positive) + double(negative));
             });
             // The lobe is held to >= 0 as it is read: what lies below counts as light, so that its integral is 1.
-            const float below = detail::dips(
-                theta_r, [&](std::uint32_t k, std::uint32_t negative) { return to[2 * (rows * negative + k)]; });
-            const float factor = at.inverse_integral / (1 + below * at.inverse_integral);
-            for (std::uint32_t k = 0; k < 2 * rows; ++k) to[2 * k] *= factor;
+            integral += double(detail::dips(
+                theta_r, [&](std::uint32_t k, std::uint32_t negative) { return to[2 * (rows * negative + k)]; }));
+            // A signed low-rank sum with no positive integral is no density: it has no light to give.
+            const double factor = integral > 1e-30 && integral < 1e30 ? 1 / integral : 0;
+            for (std::uint32_t k = 0; k < 2 * rows; ++k) to[2 * k] = float(factor * double(to[2 * k]));
         }
     }
     fibre.tables = &tables;
@@ -312,11 +325,6 @@ MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, 
     m.point = fibre.tables->longitudinal_at(std::abs(theta_i));
 }
 
-/// M^s of Eq. 19, from its two sides at |phi| / pi.
-MEDULLA_HOT float blend_sides(BackForward side, float forwardness) noexcept {
-    return (1 - forwardness) * side.back + forwardness * side.forward;
-}
-
 /// C^M back and forward straight from the factors. @param theta_r seen from the side of theta_i
 template <int Channels>
 MEDULLA_FN BackForward contracted_sides(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m,
@@ -340,11 +348,6 @@ MEDULLA_FN void longitudinal_lobes(const FurFibre<Channels>& fibre, const Longit
         fibre.tables ? fibre.tables->longitudinal_density(m.point, side) : contracted_sides(fibre, m, side);
     lobes.M[3] = lobes.M[4] = blend_sides(sides, std::abs(wrap_angle(phi)) * float(1 / pi));
 }
-
-/// Densities of TTs and TRTs at an exit, without their energies.
-struct ScatteredDensities {
-    float M = 0, D[2] = {};  ///< longitudinal and azimuthal [1 / radian]
-};
 
 /// The fibre lit from theta_i at offset h: what is left is a function of the exit (theta_r, phi).
 template <int Channels = 3>
@@ -402,15 +405,7 @@ struct NearField {
             for (int p = 0; p < 2; ++p) at.D[p] = lobe(fibre->azimuthal, azimuthal, y[p]);
             return at;
         }
-        const UnfoldedTables& tables = *fibre->tables;
-        const float around = tables.azimuth_scale();
-        // Lane 3, half turns from phi = 0, is how far forward the exit is.
-        const ExitPlaces places =
-            exit_places(turns_of(Four(y[0], y[1], inclined, phi)), Four(around, around, tables.longitude_scale(), 2));
-        for (int p = 0; p < 2; ++p) at.D[p] = tables.azimuthal_density(point, tables.azimuth_exit(places, p));
-        at.M = blend_sides(tables.longitudinal_density(longitudinal.point, tables.longitude_exit(places, 2)),
-                           places.place[3]);
-        return at;
+        return medulla::scattered_densities(*fibre->tables, point, longitudinal.point, y[0], y[1], inclined, phi);
     }
 };
 

@@ -15,6 +15,12 @@
 #if defined(__AVX2__)
 #include <immintrin.h>
 #endif
+// What may be compiled for AVX2 with fused products beside what the renderer is built for, and taken where the
+// processor has them.
+#if defined(__GNUC__) && !defined(__CUDACC__) && !defined(__HIPCC__)
+#define MEDULLA_WIDE __attribute__((target("avx2,fma")))
+#include <immintrin.h>
+#endif
 #endif
 
 namespace medulla {
@@ -43,6 +49,8 @@ inline Four choose(FourMask mask, Four yes, Four no) noexcept {
 }
 /// The greater; b for a NaN in a.
 inline Four greater(Four a, Four b) noexcept { return Four(_mm_max_ps(a.v, b.v)); }
+/// The lesser; b for a NaN in a.
+inline Four lesser(Four a, Four b) noexcept { return Four(_mm_min_ps(a.v, b.v)); }
 /// 0 where the mask is set.
 inline Four zero_where(FourMask mask, Four a) noexcept { return Four(_mm_andnot_ps(mask.v, a.v)); }
 inline Four square_root(Four a) noexcept { return Four(_mm_sqrt_ps(a.v)); }
@@ -62,6 +70,8 @@ inline bool any(FourMask mask) noexcept { return _mm_movemask_ps(mask.v) != 0; }
 inline Four four_at(const float* x) noexcept { return Four(_mm_loadu_ps(x)); }
 /// @param x aligned to 16 bytes
 inline Four aligned_four_at(const float* x) noexcept { return Four(_mm_load_ps(x)); }
+/// The whole part of lane 0, below 2^31.
+inline std::int32_t whole(Four a) noexcept { return _mm_cvttss_si32(a.v); }
 inline void store_four(Four a, float* x) noexcept { _mm_storeu_ps(x, a.v); }
 /// Whole parts of numbers below 2^31.
 inline void store_whole(Four a, std::int32_t* n) noexcept {
@@ -127,6 +137,8 @@ MEDULLA_FN Four choose(FourMask mask, Four yes, Four no) noexcept {
 }
 /// The greater; b for a NaN in a.
 MEDULLA_FN Four greater(Four a, Four b) noexcept { return choose(a > b, a, b); }
+/// The lesser; b for a NaN in a.
+MEDULLA_FN Four lesser(Four a, Four b) noexcept { return choose(a < b, a, b); }
 /// 0 where the mask is set.
 MEDULLA_FN Four zero_where(FourMask mask, Four a) noexcept { return choose(mask, Four(0.0f), a); }
 MEDULLA_FN Four square_root(Four a) noexcept {
@@ -176,6 +188,13 @@ MEDULLA_FN float lane(Four a, int i) noexcept { return a.v[i]; }
 MEDULLA_FN float sum_of(Four a) noexcept { return (a.v[0] + a.v[2]) + (a.v[1] + a.v[3]); }
 #endif
 
+/// One number, kept as a vector processor wants it for products with four others: in every lane.
+#if defined(MEDULLA_SSE2)
+using Same = Four;
+#else
+using Same = float;
+#endif
+
 /// A constant as one number or as four.
 template <class T>
 struct Constant {
@@ -192,6 +211,8 @@ MEDULLA_FN T choose(bool condition, T yes, T no) noexcept {
     return condition ? yes : no;
 }
 MEDULLA_FN float greater(float a, float b) noexcept { return a > b ? a : b; }
+MEDULLA_FN float lesser(float a, float b) noexcept { return a < b ? a : b; }
+MEDULLA_FN std::int32_t whole(float a) noexcept { return std::int32_t(a); }
 MEDULLA_FN float zero_where(bool condition, float a) noexcept { return condition ? 0.0f : a; }
 template <class T>
 MEDULLA_FN T square_root(T a) noexcept {
@@ -225,18 +246,28 @@ MEDULLA_FN float power_of_two(float k) noexcept {
 MEDULLA_FN float lane(float a, int) noexcept { return a; }
 MEDULLA_FN float sum_of(float a) noexcept { return a; }
 
-#if defined(MEDULLA_SSE2) && defined(__GNUC__) && !defined(__AVX2__) && !defined(__CUDACC__) && !defined(__HIPCC__)
+#if defined(MEDULLA_WIDE)
+/// Whether what is marked MEDULLA_WIDE can run.
+inline bool has_wide() noexcept {
+#if defined(__AVX2__) && defined(__FMA__)
+    return true;
+#else
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+#endif
+}
 namespace detail {
 template <class F>
 __attribute__((target("avx2"), flatten)) void run_on_avx2(const F& f) noexcept {
     f();
 }
 }  // namespace detail
-/// f(), compiled twice: for what the renderer is built for and, taken where the processor has it, for AVX2 with fused
-/// products. For work of microseconds, not for one number.
+/// f(), compiled twice: for what the renderer is built for and, taken where the processor has it, for AVX2. For work of
+/// microseconds, not for one number.
 template <class F>
 void run_widest(const F& f) noexcept {
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return detail::run_on_avx2(f);
+#if !defined(__AVX2__)
+    if (has_wide()) return detail::run_on_avx2(f);
+#endif
     f();
 }
 #else

@@ -4,7 +4,7 @@
 // Use.
 //   FurFibre<3> fibre;                              once per material
 //   prepare(parameters, open_pack(default_pack_words, default_pack_size).pack, fibre);
-//   UnfoldedTables tables; unfold(fibre, tables);   optional, 149 KB a material: near field 9 times as fast
+//   UnfoldedTables tables; unfold(fibre, tables);   optional, 153 KB a material: near field 9 times as fast
 //   eval(fibre, theta_i, theta_r, phi, h)           near field: a ray at offset h
 //   eval(fibre, theta_i, theta_r, phi, range)       mean over offsets; OffsetRange{} is the far field
 //   eval(fibre, omega_i, omega_r, h or range)       the same from directions in the fibre's frame

@@ -21,36 +21,53 @@ MEDULLA_HOT Four turns_of(Four y) noexcept {
     return t - nearest_integer(t);
 }
 
+/// spline_coordinate of an offset, or of an inclination over pi/2; x in [0, 1] but for rounding.
+MEDULLA_HOT Same chord_coordinate(Same x) noexcept {
+    const Same one(1.0f);
+    return x / (one + square_root(greater(one - x, Same(0.0f)) * (one + x)));
+}
+
 /// Four neighbouring rows of an axis and their weights.
 struct RowPoint {
     std::uint32_t first;
     Four weight;
 };
 
-/// Four weights that are cubics in t in [0, 1]: read, not recomputed.
-struct CubicWeights {
-    alignas(16) float power[4][4];  ///< [power of t][row]
+/// A span of an axis and the place from its middle [stretches].
+struct AxisPlace {
+    std::uint32_t span;
+    Same along;
+};
 
-    MEDULLA_HOT Four at(float t) const noexcept {
-        const Four x(t);
+/// Four weights that are cubics in a place, counted from the middle so that little rounds: read, not recomputed.
+struct CubicWeights {
+    alignas(64) float power[4][4];  ///< [power of the place][row]: a cache line
+
+    MEDULLA_HOT Four at(Same x) const noexcept {
         return (aligned_four_at(power[0]) + x * aligned_four_at(power[1])) +
                (x * x) * (aligned_four_at(power[2]) + x * aligned_four_at(power[3]));
     }
 };
 
-/// From the weights at t = 0, 1/3, 2/3, 1 (Newton's forward differences). @param f four weights at t
+/// From the weights at t = 0, 1/3, 2/3, 1, whose sum is 1: so is that of the result, to the rounding of its
+/// coefficients. @param length so much of the place is t = 0 to 1  @param f four weights at t
 template <class F>
-MEDULLA_FN CubicWeights cubic_weights(F&& f) noexcept {
+MEDULLA_FN CubicWeights cubic_weights(double length, F&& f) noexcept {
     SplineWeights<float> at[4];
     for (int i = 0; i < 4; ++i) at[i] = f(float(i) / 3);
     CubicWeights c;
+    double excess[4] = {-1, 0, 0, 0};
+    int largest = 0;
     for (int r = 0; r < 4; ++r) {
-        const float a = at[0].w[r], b = at[1].w[r], d = at[2].w[r], e = at[3].w[r];
-        c.power[0][r] = a;
-        c.power[1][r] = 9 * (b - d) + e - 5.5f * a + 4.5f * d;
-        c.power[2][r] = 4.5f * (2 * a - 5 * b + 4 * d - e);
-        c.power[3][r] = 4.5f * (3 * (b - d) + e - a);
+        const double a = double(at[0].w[r]), b = double(at[1].w[r]), d = double(at[2].w[r]), e = double(at[3].w[r]);
+        const double power[4] = {(9 * (b + d) - (a + e)) / 16, (27 * (d - b) - (e - a)) / 8, 2.25 * ((a + e) - (b + d)),
+                                 4.5 * ((e - a) - 3 * (d - b))};
+        double scale = 1;
+        for (int k = 0; k < 4; ++k, scale /= length)
+            c.power[k][r] = float(power[k] * scale), excess[k] += double(c.power[k][r]);
+        if (at[1].w[r] + at[2].w[r] > at[1].w[largest] + at[2].w[largest]) largest = r;
     }
+    for (int k = 0; k < 4; ++k) c.power[k][largest] = float(double(c.power[k][largest]) - excess[k]);
     return c;
 }
 
@@ -65,88 +82,99 @@ MEDULLA_FN SplineWeights<float> lagrange_weights(const float (&x)[4], float at) 
     return w;
 }
 
-/// A span of an axis.
-struct CubicSpan {
-    CubicWeights weights;      ///< of its four rows, over the place within it
-    float low, high, inverse;  ///< its ends and 1 / its length [stretches]; the last one's upper end is out of reach
-    std::uint32_t first;       ///< of its four rows
-};
-
-/// An axis of a pack with the weights of each of its spans. Even stretches say which span a value lies in; breakpoints
-/// fall on their ends where that can be had (those of exits do, being whole bins apart), so that none is searched.
-template <std::uint32_t Most>
+/// An axis of a pack, from 0, with the weights of each of its spans, cubics in the distance from its middle
+/// [stretches]. Even stretches say which span a value lies in: where a breakpoint is not the end of one (those of exits
+/// are, being whole bins apart), the nearest end stands in for it, off by at most a 32nd of a span. There the cubics of
+/// two neighbours differ by the cube of that in a spline (default pack: 1e-8 of a lobe), through nodes by a tenth of what
+/// they err between them.
+template <std::uint32_t Most, std::int32_t most_stretches>
 struct CubicAxis {
-    static constexpr std::int32_t most_stretches = 720;
     std::uint32_t spans = 0;
     std::int32_t stretches = 0;
-    float lower, upper, scale;               ///< scale = stretches / (upper - lower)
-    std::uint8_t start[most_stretches + 1];  ///< the span at the beginning of the stretch; one more for the upper end
-    alignas(16) CubicSpan span[Most];
+    float scale, end;                        ///< stretches / upper end of the axis; stretches
+    float middle[Most];                      ///< of a span [stretches]
+    std::uint8_t first[Most];                ///< of a span's four rows
+    std::uint8_t start[most_stretches + 1];  ///< the span at the middle of the stretch; one more for the upper end
+    CubicWeights weights[Most];
 
-    /// Rows are the pack's spline coefficients.
-    MEDULLA_FN void set_spline(const AxisView<float>& axis) noexcept {
-        set(
+    /// Rows are the pack's spline coefficients. false where spans are too narrow.
+    MEDULLA_FN bool set_spline(const AxisView<float>& axis) noexcept {
+        return set(
             axis.spans, [&](std::uint32_t i) { return axis.breakpoint(std::int32_t(i)); },
-            [&](std::uint32_t i, float a, float b) {
-                span[i].first = i;
-                return cubic_weights([&](float t) { return spline_weights(axis, Cell<float>{i, a + t * (b - a)}); });
+            [&](std::uint32_t i, float a, float b, float length) {
+                first[i] = static_cast<std::uint8_t>(i);
+                return cubic_weights(double(length), [&](float t) {
+                    return spline_weights(axis, Cell<float>{i, a + t * (b - a)});
+                });
             });
     }
     /// Rows are values at count + 1 ascending nodes, joined by the cubic through the four nearest; count >= 3.
-    MEDULLA_FN void set_nodes(std::uint32_t count, const float* node) noexcept {
-        set(
+    MEDULLA_FN bool set_nodes(std::uint32_t count, const float* node) noexcept {
+        return set(
             count, [&](std::uint32_t i) { return node[i]; },
-            [&](std::uint32_t i, float a, float b) {
+            [&](std::uint32_t i, float a, float b, float length) {
                 const std::uint32_t before = i > 0 ? i - 1 : 0, from = before + 3 <= count ? before : count - 3;
-                span[i].first = from;
+                first[i] = static_cast<std::uint8_t>(from);
                 const float x[4] = {node[from], node[from + 1], node[from + 2], node[from + 3]};
-                return cubic_weights([&](float t) { return lagrange_weights(x, a + t * (b - a)); });
+                return cubic_weights(double(length), [&](float t) { return lagrange_weights(x, a + t * (b - a)); });
             });
     }
-    /// @param x a spline coordinate, held to the axis's ends; no NaN
-    MEDULLA_HOT RowPoint at(float x) const noexcept {
-        x = x > lower ? x : lower, x = x < upper ? x : upper;
-        const float u = (x - lower) * scale;
-        const auto stretch = std::int32_t(u);
-        return at(stretch < stretches ? stretch : stretches, u);
+    /// The span of a spline coordinate >= 0; beyond the axis, as for a NaN, its end holds.
+    MEDULLA_HOT AxisPlace place(Same x) const noexcept {
+        const Same u = lesser(x * Same(scale), Same(end));
+        const std::uint32_t i = start[std::uint32_t(whole(u))];
+        return {i, u - Same(middle[i])};
     }
-    /// @param u a place [stretches] on the axis, in stretch `stretch`
+    MEDULLA_HOT RowPoint at(Same x) const noexcept {
+        const AxisPlace p = place(x);
+        return {first[p.span], weights[p.span].at(p.along)};
+    }
+    /// The same of a spline. @param u a place [stretches] on the axis, in stretch `stretch`
     MEDULLA_HOT RowPoint at(std::int32_t stretch, float u) const noexcept {
-        const CubicSpan* s = span + start[stretch];
-        while (s->high <= u) ++s;  // where a breakpoint lies within the stretch
-        return {s->first, s->weights.at((u - s->low) * s->inverse)};
+        const std::uint32_t i = start[std::uint32_t(stretch)];
+        return {i, weights[i].at(Same(u) - Same(middle[i]))};
+    }
+
+    /// Integral over a spline's axis of what each row is weighted by [the axis's unit].
+    MEDULLA_FN void integrate(const AxisView<float>& axis, double (&rows)[Most + 3]) const noexcept {
+        for (double& row : rows) row = 0;
+        for (std::uint32_t i = 0; i < spans; ++i) {
+            const auto k = std::int32_t(i);
+            const double width = double(axis.breakpoint(k + 1)) - double(axis.breakpoint(k)),
+                         length = width * double(scale);
+            for (std::uint32_t r = 0; r < 4; ++r)
+                rows[i + r] +=
+                    width * (double(weights[i].power[0][r]) + length * length / 12 * double(weights[i].power[2][r]));
+        }
     }
 
   private:
     template <class Breakpoint, class F>
-    MEDULLA_FN void set(std::uint32_t count, Breakpoint&& breakpoint, F&& weights_of) noexcept {
-        spans = count, lower = breakpoint(0), upper = breakpoint(count);
-        // Rounding moves a place by 1e-4 stretches, so within 1e-3 of an end is the end; the cubic of the neighbouring
-        // span is there the same to the third power of that.
-        constexpr float near = 1e-3f;
-        const auto on_ends = [&](std::int32_t n) {
+    MEDULLA_FN bool set(std::uint32_t count, Breakpoint&& breakpoint, F&& weights_of) noexcept {
+        spans = count;
+        const float upper = breakpoint(count);
+        const auto on_ends = [&] {  // but for rounding
             for (std::uint32_t i = 1; i < spans; ++i) {
-                const float u = (breakpoint(i) - lower) * float(n) / (upper - lower);
-                if (magnitude(u - nearest_integer(u)) > near) return false;
+                const float u = breakpoint(i) * float(stretches) / upper;
+                if (magnitude(u - nearest_integer(u)) > 1e-3f) return false;
             }
             return true;
         };
         stretches = std::int32_t(spans);
-        while (stretches < most_stretches && !on_ends(stretches)) ++stretches;
-        scale = float(stretches) / (upper - lower);
+        while (stretches < most_stretches && !on_ends()) ++stretches;
+        const float narrowest = on_ends() ? 0.5f : 16.0f;
+        end = float(stretches), scale = end / upper;
+        std::int32_t from = 0;
         for (std::uint32_t i = 0; i < spans; ++i) {
-            const float a = breakpoint(i), b = breakpoint(i + 1);
-            span[i].weights = weights_of(i, a, b);
-            span[i].low = (a - lower) * scale, span[i].high = (b - lower) * scale;
-            span[i].inverse = 1 / (span[i].high - span[i].low);
+            const float a = breakpoint(i), b = breakpoint(i + 1), length = (b - a) * scale;
+            if (!(length > narrowest)) return false;
+            middle[i] = 0.5f * (a + b) * scale;
+            weights[i] = weights_of(i, a, b, length);
+            for (const float next = b * scale; from < stretches && float(from) + 0.5f < next; ++from)
+                start[from] = static_cast<std::uint8_t>(i);
         }
-        std::uint32_t at = 0;
-        for (std::int32_t i = 0; i <= stretches; ++i) {
-            while (at + 1 < spans && span[at].high <= float(i) + near) ++at;
-            start[i] = static_cast<std::uint8_t>(at);
-        }
-        for (std::uint32_t i = 0; i + 1 < spans; ++i) span[i].high += near;
-        span[spans - 1].high = 3.4e38f;
+        while (from <= stretches) start[from++] = static_cast<std::uint8_t>(spans - 1);
+        return true;
     }
 };
 
@@ -154,7 +182,11 @@ struct CubicAxis {
 struct AzimuthalPoint {
     const float* rows;
     Four offset, sigma;
-    float inverse_integral;
+};
+
+/// Densities of TTs and TRTs [1 / radian].
+struct TwoDensities {
+    float TTs, TRTs;
 };
 
 /// C^M of both sides at one theta_i (sigma goes with it).
@@ -184,53 +216,51 @@ MEDULLA_HOT ExitPlaces exit_places(Four turns, Four scale) noexcept {
     return p;
 }
 
-/// The tables of one material, 149 KB in memory that the caller keeps for as long as the fibre that reads them.
+/// The tables of one material, 153 KB in memory that the caller keeps for as long as the fibre that reads them.
 struct UnfoldedTables {
-    float least_root = 0, inverse_range = 0;  ///< sqrt(sigma) runs over [least_root, least_root + 1 / inverse_range]
-    CubicWeights sigma_weights;               ///< of four Chebyshev nodes in it
-    CubicAxis<most_offset_spans> offset;
-    CubicAxis<most_inclination_spans> inclination;
-    CubicAxis<most_exit_spans> azimuth, longitude;
-    /// Coefficients of the exit spline: [row of h][y >= 0 or y < 0][row of |y|][sigma node].
+    float middle_root = 0, inverse_range = 0;  ///< of the range of sqrt(sigma), 1 / its length
+    std::uint32_t azimuth_rows = 0, longitude_rows = 0;
+    float azimuth_scale = 0, longitude_scale = 0;  ///< stretches per turn
+    CubicWeights sigma_weights;                    ///< of four Chebyshev nodes in it
+    CubicAxis<most_offset_spans, 2048> offset;
+    CubicAxis<most_inclination_spans, 2048> inclination;
+    CubicAxis<most_exit_spans, 720> azimuth, longitude;
+    /// Coefficients of the exit spline, each row of h and sigma divided by its integral over phi, so that any blend of
+    /// rows integrates to 1: [row of h][y >= 0 or y < 0][row of |y|][sigma node].
     alignas(16) float azimuthal[(most_offset_spans + 3) * 2 * (most_exit_spans + 3) * 4];
-    alignas(16) float integral[most_offset_spans + 3][4];  ///< over phi: [row of h][sigma node]
     /// The same: [row of theta_i][y >= 0 or y < 0][row of |y|][back, forward].
     alignas(16) float longitudinal[(most_inclination_spans + 1) * 2 * (most_exit_spans + 3) * 2];
 
-    MEDULLA_FN std::uint32_t azimuth_rows() const noexcept { return azimuth.spans + 3; }
-    MEDULLA_FN std::uint32_t longitude_rows() const noexcept { return longitude.spans + 3; }
-
-    MEDULLA_HOT Four sigma_at(float sigma) const noexcept {
-        const float t = (std::sqrt(sigma) - least_root) * inverse_range;
-        return sigma_weights.at(t < 0 ? 0.0f : (t > 1 ? 1.0f : t));
+    /// false where spans are too narrow.
+    MEDULLA_FN bool set_exits(const AxisView<float>& phi, const AxisView<float>& theta_r) noexcept {
+        if (!azimuth.set_spline(phi) || !longitude.set_spline(theta_r)) return false;
+        azimuth_rows = phi.spans + 3, longitude_rows = theta_r.spans + 3;
+        azimuth_scale = 2 * azimuth.end, longitude_scale = 4 * longitude.end;
+        return true;
     }
+    MEDULLA_HOT Same sigma_place(float sigma) const noexcept {
+        const Same t = (square_root(Same(sigma)) - Same(middle_root)) * Same(inverse_range);
+        return lesser(greater(t, Same(-0.5f)), Same(0.5f));
+    }
+    MEDULLA_HOT Four sigma_at(float sigma) const noexcept { return sigma_weights.at(sigma_place(sigma)); }
     /// @param sigma what sigma_at gave  @param h offset [medulla radii], in [0, 1]
     MEDULLA_HOT AzimuthalPoint azimuthal_at(Four sigma, float h) const noexcept {
-        const RowPoint row = offset.at(spline_coordinate(Quantity::h, h));
-        const float* x = integral[row.first];
-        const Four sum =
-            (spread<0>(row.weight) * aligned_four_at(x) + spread<1>(row.weight) * aligned_four_at(x + 4)) +
-            (spread<2>(row.weight) * aligned_four_at(x + 8) + spread<3>(row.weight) * aligned_four_at(x + 12));
-        const float total = sum_of(sum * sigma);
-        return {azimuthal + std::size_t(row.first) * 8 * azimuth_rows(), row.weight, sigma,
-                total > 1e-30f && total < 1e30f ? 1 / total : 0.0f};
+        const RowPoint row = offset.at(chord_coordinate(Same(h)));
+        return {azimuthal + std::size_t(row.first) * 8 * azimuth_rows, row.weight, sigma};
     }
-    MEDULLA_HOT float azimuth_scale() const noexcept { return float(2 * azimuth.stretches); }
-    MEDULLA_HOT float longitude_scale() const noexcept { return float(4 * longitude.stretches); }
-
     /// Where exit i lies among an azimuthal point's rows.
     MEDULLA_HOT RowPoint azimuth_exit(const ExitPlaces& p, int i) const noexcept {
         const RowPoint exit = azimuth.at(p.stretch[i], p.place[i]);
-        return {4 * (exit.first + azimuth_rows() * (p.below >> i & 1u)), exit.weight};
+        return {4 * (exit.first + azimuth_rows * (p.below >> i & 1u)), exit.weight};
     }
     /// Where exit i lies among a longitudinal point's rows.
     MEDULLA_HOT RowPoint longitude_exit(const ExitPlaces& p, int i) const noexcept {
         const RowPoint exit = longitude.at(p.stretch[i], p.place[i]);
-        return {2 * (exit.first + longitude_rows() * (p.below >> i & 1u)), exit.weight};
+        return {2 * (exit.first + longitude_rows * (p.below >> i & 1u)), exit.weight};
     }
     /// Density per radian at an exit, >= 0.
     MEDULLA_HOT float azimuthal_density(const AzimuthalPoint& p, const RowPoint& exit) const noexcept {
-        const std::uint32_t step = 8 * azimuth_rows();
+        const std::uint32_t step = 8 * azimuth_rows;
         const float *r0 = p.rows + exit.first, *r1 = r0 + step, *r2 = r1 + step, *r3 = r2 + step;
         // h first: its weights are known before the exit's.
         const auto blend = [&](int k) {
@@ -239,26 +269,26 @@ struct UnfoldedTables {
         };
         const Four sum = (spread<0>(exit.weight) * blend(0) + spread<1>(exit.weight) * blend(4)) +
                          (spread<2>(exit.weight) * blend(8) + spread<3>(exit.weight) * blend(12));
-        const float value = sum_of(sum * p.sigma) * p.inverse_integral;
+        const float value = sum_of(sum * p.sigma);
         return 0.0f > value ? 0.0f : value;  // a NaN stays one
     }
     /// @param y [radians], |y| < 1e9
     MEDULLA_HOT float azimuthal_density(const AzimuthalPoint& p, float y) const noexcept {
-        return azimuthal_density(p, azimuth_exit(exit_places(turns_of(Four(y)), Four(azimuth_scale())), 0));
+        return azimuthal_density(p, azimuth_exit(exit_places(turns_of(Four(y)), Four(azimuth_scale)), 0));
     }
     /// At two exits, as TTs and TRTs ask.
-    MEDULLA_HOT void azimuthal_densities(const AzimuthalPoint& p, float y0, float y1, float (&N)[2]) const noexcept {
-        const ExitPlaces at = exit_places(turns_of(Four(y0, y1, y0, y1)), Four(azimuth_scale()));
-        for (int i = 0; i < 2; ++i) N[i] = azimuthal_density(p, azimuth_exit(at, i));
+    MEDULLA_HOT TwoDensities azimuthal_densities(const AzimuthalPoint& p, float y0, float y1) const noexcept {
+        const ExitPlaces at = exit_places(turns_of(Four(y0, y1, y0, y1)), Four(azimuth_scale));
+        return {azimuthal_density(p, azimuth_exit(at, 0)), azimuthal_density(p, azimuth_exit(at, 1))};
     }
     /// @param theta_i [radians], in [0, pi/2]
     MEDULLA_HOT LongitudinalPoint longitudinal_at(float theta_i) const noexcept {
-        const RowPoint row = inclination.at(spline_coordinate(Quantity::theta_i, theta_i));
-        return {longitudinal + std::size_t(row.first) * 4 * longitude_rows(), row.weight};
+        const RowPoint row = inclination.at(chord_coordinate(Same(theta_i * float(2 / pi))));
+        return {longitudinal + std::size_t(row.first) * 4 * longitude_rows, row.weight};
     }
     /// Densities per radian at an exit, >= 0.
     MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, const RowPoint& exit) const noexcept {
-        const std::uint32_t step = 4 * longitude_rows();
+        const std::uint32_t step = 4 * longitude_rows;
         const float *r0 = p.rows + exit.first, *r1 = r0 + step, *r2 = r1 + step, *r3 = r2 + step;
         const auto blend = [&](int k) {
             return (spread<0>(p.weight) * four_at(r0 + k) + spread<1>(p.weight) * four_at(r1 + k)) +
@@ -269,7 +299,7 @@ struct UnfoldedTables {
     }
     /// @param y [radians], in [-pi/2, pi/2]
     MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, float y) const noexcept {
-        return longitudinal_density(p, longitude_exit(exit_places(turns_of(Four(y)), Four(longitude_scale())), 0));
+        return longitudinal_density(p, longitude_exit(exit_places(turns_of(Four(y)), Four(longitude_scale)), 0));
     }
     /// Lanes 0 + 2 and 1 + 3, >= 0; a NaN stays one.
     static MEDULLA_HOT BackForward both_of(Four sum) noexcept {
@@ -277,17 +307,5 @@ struct UnfoldedTables {
         return {0.0f > back ? 0.0f : back, 0.0f > forward ? 0.0f : forward};
     }
 };
-
-namespace detail {
-
-/// integral over y of the contracted lobe.
-MEDULLA_FN float exit_integral(const TableView& view, const float* weight) noexcept {
-    float sum = 0;
-    for (std::uint32_t r = 0; r < view.even_stride(); ++r)
-        sum += weight[r] * load<float>(view.bytes + view.layout.integrals_offset + 4 * r);
-    return sum;
-}
-
-}  // namespace detail
 
 }  // namespace medulla

@@ -1,5 +1,6 @@
-// libFuzzer: bytes -> open_pack -> everything that a renderer asks of a pack, all of it finite. The checksum is mended
-// in half of the inputs (by their first byte), so that the checks behind it are reached.
+// libFuzzer: bytes -> open_pack -> everything that a renderer asks of a pack, lookups all finite, and of fibres that read
+// it (whose products of two lobes of an absurd pack may not be). The checksum is mended in half of the inputs (by their
+// first byte), so that the checks behind it are reached.
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -35,6 +36,29 @@ void ask(const PackView& pack) {
         }
 }
 
+void ask_fibre(const FurParameters<1>& material, const PackView& pack, UnfoldedTables& tables) {
+    FurFibre<1> fibre;
+    prepare(material, pack, fibre);
+    for (int pass = 0; pass < 2; ++pass) {
+        for (const float theta_i : {0.0f, -1.2f, 1.5707f}) {
+            NearField<1> near;
+            near_field(fibre, theta_i, 0.6f, near);
+            NearSampler<1> sampler;
+            sampler.prepare(near);
+            const FurSample<1> sample = sampler.sample({0.9f, 0.7f, 0.3f, 0.1f});
+            near.eval(sample.theta_r, sample.phi);
+            float theta_r[16], phi[16];
+            Colour<1> S[16];
+            for (int i = 0; i < 16; ++i) theta_r[i] = 0.2f * float(i) - 1.5f, phi[i] = 0.4f * float(i) - 3;
+            eval(near, 16, theta_r, phi, S);
+            FarField<1> far;
+            far_field(fibre, theta_i, {}, far, FarQuality::draft);
+            far.eval(0.2f, 1.0f);
+        }
+        if (!unfold(fibre, tables)) return;
+    }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
@@ -47,6 +71,12 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
         std::memcpy(bytes.data() + offsetof(PackHeader, checksum), &sum, sizeof sum);
     }
     const OpenResult opened = open_pack(bytes.data(), bytes.size());
-    if (opened.status == PackStatus::ok) ask(opened.pack);
+    if (opened.status != PackStatus::ok) return 0;
+    ask(opened.pack);
+    static UnfoldedTables tables;
+    FurParameters<1> material = parameters_of<1>(*find_preset("bobcat"));
+    ask_fibre(material, opened.pack, tables);
+    material.sigma_ma = 0.5f, material.eta = 1.3f;
+    ask_fibre(material, opened.pack, tables);
     return 0;
 }

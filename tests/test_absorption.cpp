@@ -3,6 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
+#include <memory>
 
 #include "analytic_pack.hpp"
 #include "fur_reference.hpp"
@@ -292,6 +293,44 @@ TEST_CASE("Near field with the axis: the plain twin, Eq. 20 without it, the clea
         // Another axis rounds its factors to 12 bits.
         for (int lobe = 0; lobe < lobe_count; ++lobe)
             CHECK(a.N[lobe][0] == Approx(b.N[lobe][0]).epsilon(2e-3).margin(1e-6));
+    }
+}
+
+TEST_CASE("Unfolded tables with the axis: the factors' lobes, energies and far fields",
+          "[absorption][bcsdf][unfolded]") {
+    // Absorption goes with sigma, and sigma with theta_i. A real pack and the analytic one; the bound is that of
+    // unfolding without the axis.
+    const AbsorbingAnalyticPack analytic_pack;
+    const OpenResult real = open_pack(absorbing_pack().pack.data(), absorbing_pack().pack.size());
+    REQUIRE(real.status == PackStatus::ok);
+    for (const PackView* pack : {&analytic_pack.view, &real.pack}) {
+        FurFibre<3> fibre;
+        FurParameters<3> p = absorbing_fur();
+        REQUIRE(prepare(p, *pack, fibre) == FurStatus::ok);
+        FurFibre<3> unfolded = fibre;
+        const auto tables = std::make_unique<UnfoldedTables>();
+        REQUIRE(unfold(unfolded, *tables));
+        double difference = 0, norm = 0;
+        for (const float theta_i : {0.0f, -0.7f, 1.3f, 1.55f})
+            for (const float h : {-1.0f, -0.6f, 0.1f, 0.7f}) {
+                NearField<3> a, b;
+                near_field(fibre, theta_i, h, a), near_field(unfolded, theta_i, h, b);
+                for (int lobe = 3; lobe < lobe_count; ++lobe)
+                    CHECK(b.energy.A[lobe][1] == Approx(a.energy.A[lobe][1]).epsilon(1e-4).margin(1e-7));
+                for (int i = 0; i < 24; ++i) {
+                    const float phi = -3.1f + 0.26f * float(i);
+                    const LobeValues<3> x = a.lobes(0.2f, phi), y = b.lobes(0.2f, phi);
+                    for (int lobe = 3; lobe < lobe_count; ++lobe) {
+                        difference += std::pow(double(x.N[lobe][1]) - double(y.N[lobe][1]), 2);
+                        norm += std::pow(double(x.N[lobe][1]), 2);
+                    }
+                }
+            }
+        CHECK(std::sqrt(difference / norm) < 1e-4);
+        FarField<3> far, far_unfolded;
+        far_field(fibre, 0.8f, {}, far), far_field(unfolded, 0.8f, {}, far_unfolded);
+        for (const float phi : {-2.0f, 0.4f, 3.0f})
+            CHECK(far_unfolded.eval(0.1f, phi).value[1] == Approx(far.eval(0.1f, phi).value[1]).epsilon(1e-3));
     }
 }
 

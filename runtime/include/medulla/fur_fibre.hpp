@@ -91,6 +91,17 @@ MEDULLA_FN void contract(const MaterialTable& table, float sigma, float last, Co
     contract(table, sigma_point(table, sigma), last_point(table, last), result);
 }
 
+/// The lengths that are left at (sigma, g, absorption): a spline in h.
+MEDULLA_FN void contract_survival(const TableView& view, float sigma, float g, float absorbed,
+                                  Contraction& result) noexcept {
+    const float at[3] = {sigma, g, absorbed};
+    start_contraction(view, result.weight);
+    for (std::uint32_t k = 0; k < 3; ++k) contract_axis(view, k, at[k], result.weight, result.weight);
+}
+MEDULLA_FN float survival_coefficient(const TableView& view, const Contraction& c, std::uint32_t row) noexcept {
+    return detail::row_sums(view, 3, row, c.weight).even;
+}
+
 /// Whether axis `i` of one table has the breakpoints of axis `k` of another: what is located once then serves both.
 MEDULLA_FN bool same_axis(const TableView& a, std::uint32_t i, const TableView& b, std::uint32_t k) noexcept {
     const PackAxis &x = a.layout.axes[i], &y = b.layout.axes[k];
@@ -161,12 +172,12 @@ inline constexpr std::uint32_t halved_spans = 5;
 
 /// Multiplies the material's tables out into `tables`, which `fibre` then reads instead of the factors; takes about
 /// 1 ms with the default pack. false, and the fibre reads its factors, where they do not fit: longer or fewer than 3
-/// spans of an axis, longitudinal tables on different axes or not up to 90 degrees, an axis of absorption, a sigma axis
-/// that begins above the material's, eta so near 1 that sigma's range is wide.
+/// spans of an axis, longitudinal tables on different axes or not up to 90 degrees, a sigma axis that begins above the
+/// material's (or, where absorption goes with sigma, ends below it), eta so near 1 that sigma's range is wide.
 template <int Channels>
 MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexcept {
     fibre.tables = nullptr;
-    if (!fibre.scattered || !fibre.paired || fibre.survival) return false;
+    if (!fibre.scattered || !fibre.paired) return false;
     const MaterialTable &around = fibre.azimuthal, &back = fibre.back, &forward = fibre.forward;
     const AxisView<float> offset = around.view.axis(around.last_axis), theta = back.view.axis(back.last_axis);
     const AxisView<float> phi = around.view.axis(around.view.parameter_axes());
@@ -178,6 +189,10 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
         return p.sigma_ms * p.kappa * p.eta / std::sqrt((p.eta - 1) * (p.eta + 1) + cos_i * cos_i);
     };
     const float low = held(std::sqrt(sigma_at(1))), high = held(std::sqrt(sigma_at(0)));
+    // Both optical radii are per cos theta_t: where there is an axis of absorption it goes with sigma.
+    if (fibre.survival &&
+        (std::sqrt(sigma_at(0)) > sigma.upper() || !same_axis(fibre.survival, 3, around.view, around.last_axis)))
+        return false;
     if (offset.spans > most_offset_spans || theta.spans < 3 || theta.spans + halved_spans > most_inclination_spans ||
         phi.spans > most_exit_spans || theta_r.spans > most_exit_spans || high > widest_root_range * low ||
         low < sigma.lower() || theta.upper() < 1 || !(offset.lower() == 0) || !(theta.lower() == 0))
@@ -186,7 +201,7 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
     std::uint32_t nodes = 0;
     for (std::uint32_t j = 0; j <= theta.spans; ++j) {
         const float at = theta.breakpoint(std::int32_t(j));
-        if (j + halved_spans > theta.spans) node[nodes] = 0.5f * (node[nodes - 1] + at), ++nodes;
+        if (j > 0 && j + halved_spans > theta.spans) node[nodes] = 0.5f * (node[nodes - 1] + at), ++nodes;
         node[nodes++] = at;
     }
     if (!tables.offset.set_spline(offset) || !tables.inclination.set_nodes(nodes - 1, node) ||
@@ -200,8 +215,9 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
     tables.azimuth.integrate(phi, share);
     Contraction at_sigma, at;
     for (std::uint32_t s = 0; s < 4; ++s) {
-        const float root = low + chebyshev[s] * (high - low);
-        contract_axis(around.view, around.sigma_axis, root * root, around.weight, at_sigma.weight);
+        const float root = low + chebyshev[s] * (high - low), absorbed = root * root * p.sigma_ma / p.sigma_ms;
+        const float* weight = weights_at(around, absorbed, at_sigma.weight);
+        contract_axis(around.view, around.sigma_axis, root * root, weight, at_sigma.weight);
         for (std::uint32_t j = 0; j < offset.spans + 3; ++j) {
             scale_by_row(around.view, around.last_axis, j, at_sigma.weight, at.weight);
             float* to = tables.azimuthal + std::size_t(j) * 8 * tables.azimuth_rows + s;
@@ -213,6 +229,12 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
             if (!(std::abs(integral - 1) < most_imbalance)) return false;
             for (std::uint32_t k = 0; k < 2 * tables.azimuth_rows; ++k) to[4 * k] = float(double(to[4 * k]) / integral);
         }
+    }
+    for (std::uint32_t s = 0; fibre.survival && s < 4; ++s) {
+        const float root = low + chebyshev[s] * (high - low), absorbed = root * root * p.sigma_ma / p.sigma_ms;
+        contract_survival(fibre.survival, root * root, p.g, absorbed, at);
+        for (std::uint32_t j = 0; j < offset.spans + 3; ++j)
+            tables.survival[4 * j + s] = survival_coefficient(fibre.survival, at, j);
     }
     tables.longitude.integrate(theta_r, share);
     const std::uint32_t rows = tables.longitude_rows;
@@ -278,7 +300,7 @@ struct Longitudinal {
     Four sigma_point;           ///< where sigma lies in unfolded tables; set where
     LongitudinalPoint point;    ///< set where the fibre scatters and its tables are unfolded
     Contraction back, forward;  ///< set where the fibre scatters and they are not
-    Contraction survival;       ///< of the axes before h, where the fibre has such a table
+    Contraction survival;       ///< of the axes before h, where the fibre has such a table and it is not unfolded
 };
 
 /// Sets m.back and m.forward: the longitudinal factors contracted to m.sigma and theta_i.
@@ -314,13 +336,10 @@ MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, 
     m.sigma = fibre.parameters.sigma_ms * fibre.parameters.kappa * m.at.inverse_cos_t;
     m.absorbed = fibre.parameters.sigma_ma * fibre.parameters.kappa * m.at.inverse_cos_t;
     if (!fibre.scattered) return;
-    if (fibre.survival) {
-        const float at[3] = {m.sigma, fibre.parameters.g, m.absorbed};
-        start_contraction(fibre.survival, m.survival.weight);
-        for (std::uint32_t k = 0; k < 3; ++k)
-            contract_axis(fibre.survival, k, at[k], m.survival.weight, m.survival.weight);
+    if (fibre.tables == nullptr) {
+        if (fibre.survival) contract_survival(fibre.survival, m.sigma, fibre.parameters.g, m.absorbed, m.survival);
+        return contract_longitudinal(fibre, theta_i, m);
     }
-    if (fibre.tables == nullptr) return contract_longitudinal(fibre, theta_i, m);
     m.sigma_point = fibre.tables->sigma_at(m.sigma);
     m.point = fibre.tables->longitudinal_at(std::abs(theta_i));
 }
@@ -413,12 +432,12 @@ struct NearField {
 /// has it.
 template <int Channels>
 MEDULLA_FN float survival_at(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m, float offset) noexcept {
-    const TableView& table = fibre.survival;
-    if (!table) return 1;
-    const AxisPoint at = axis_point(table, 3, offset);
+    if (!fibre.survival) return 1;
+    if (fibre.tables != nullptr) return survival_of(m.absorbed, fibre.tables->survival_length(m.sigma_point, offset));
+    const AxisPoint at = axis_point(fibre.survival, 3, offset);
     float length = 0;
     for (std::uint32_t t = 0; t < 4; ++t)
-        length += at.weights.w[t] * detail::row_sums(table, 3, at.span + t, m.survival.weight).even;
+        length += at.weights.w[t] * survival_coefficient(fibre.survival, m.survival, at.span + t);
     return survival_of(m.absorbed, length);
 }
 template <int Channels>

@@ -230,6 +230,8 @@ struct UnfoldedTables {
     alignas(16) float azimuthal[(most_offset_spans + 3) * 2 * (most_exit_spans + 3) * 4];
     /// The same: [row of theta_i][y >= 0 or y < 0][row of |y|][back, forward].
     alignas(16) float longitudinal[(most_inclination_spans + 1) * 2 * (most_exit_spans + 3) * 2];
+    alignas(
+        16) float survival[(most_offset_spans + 3) * 4];  ///< lengths, where the pack has them: [row of h][sigma node]
 
     /// false where spans are too narrow.
     MEDULLA_FN bool set_exits(const AxisView<float>& phi, const AxisView<float>& theta_r) noexcept {
@@ -247,6 +249,13 @@ struct UnfoldedTables {
     MEDULLA_HOT AzimuthalPoint azimuthal_at(Four sigma, float h) const noexcept {
         const RowPoint row = offset.at(chord_coordinate(Same(h)));
         return {azimuthal + std::size_t(row.first) * 8 * azimuth_rows, row.weight, sigma};
+    }
+    /// What -log(survival) is per absorption.  @param sigma, h as above
+    MEDULLA_HOT float survival_length(Four sigma, float h) const noexcept {
+        const RowPoint row = offset.at(chord_coordinate(Four(h)));
+        const float* r = survival + 4 * row.first;
+        return sum_of(sigma * ((spread<0>(row.weight) * four_at(r) + spread<1>(row.weight) * four_at(r + 4)) +
+                               (spread<2>(row.weight) * four_at(r + 8) + spread<3>(row.weight) * four_at(r + 12))));
     }
     /// Where exit i lies among an azimuthal point's rows.
     MEDULLA_HOT RowPoint azimuth_exit(const ExitPlaces& p, int i) const noexcept {

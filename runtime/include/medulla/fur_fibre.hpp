@@ -212,6 +212,12 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
     tables.middle_root = 0.5f * (low + high), tables.inverse_range = high > low ? 1 / (high - low) : 0;
     tables.sigma_weights = cubic_weights(1, [&](float t) { return lagrange_weights(chebyshev, t); });
     double share[most_exit_spans + 3];  // of an exit's row in the integral
+    const auto integral_of = [&](const float* to, std::uint32_t rows, std::uint32_t step) {
+        double sum = 0;
+        for (std::uint32_t k = 0; k < rows; ++k)
+            sum += share[k] * (double(to[step * k]) + double(to[step * (rows + k)]));
+        return sum;
+    };
     tables.azimuth.integrate(phi, share);
     Contraction at_sigma, at;
     for (std::uint32_t s = 0; s < 4; ++s) {
@@ -221,11 +227,10 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
         for (std::uint32_t j = 0; j < offset.spans + 3; ++j) {
             scale_by_row(around.view, around.last_axis, j, at_sigma.weight, at.weight);
             float* to = tables.azimuthal + std::size_t(j) * 8 * tables.azimuth_rows + s;
-            double integral = 0;
             detail::exit_coefficients(around.view, at.weight, [&](std::uint32_t k, float positive, float negative) {
                 to[4 * k] = positive, to[4 * (tables.azimuth_rows + k)] = negative;
-                integral += share[k] * (double(positive) + double(negative));
             });
+            const double integral = integral_of(to, tables.azimuth_rows, 4);
             if (!(std::abs(integral - 1) < most_imbalance)) return false;
             for (std::uint32_t k = 0; k < 2 * tables.azimuth_rows; ++k) to[4 * k] = float(double(to[4 * k]) / integral);
         }
@@ -244,14 +249,13 @@ MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexce
             const MaterialTable& table = side == 0 ? back : forward;
             contract(table, sigma_at(std::cos(theta_i)), theta_i, at);
             float* to = tables.longitudinal + std::size_t(j) * 4 * rows + side;
-            double integral = 0;
             detail::exit_coefficients(table.view, at.weight, [&](std::uint32_t k, float positive, float negative) {
                 to[2 * k] = positive, to[2 * (rows + k)] = negative;
-                integral += share[k] * (double(positive) + double(negative));
             });
             // The lobe is held to >= 0 as it is read: what lies below counts as light, so that its integral is 1.
-            integral += double(detail::dips(
+            const double below = double(detail::dips(
                 theta_r, [&](std::uint32_t k, std::uint32_t negative) { return to[2 * (rows * negative + k)]; }));
+            const double integral = integral_of(to, rows, 2) + below;
             // A signed low-rank sum with no positive integral is no density: it has no light to give.
             const double factor = integral > 1e-30 && integral < 1e30 ? 1 / integral : 0;
             for (std::uint32_t k = 0; k < 2 * rows; ++k) to[2 * k] = float(factor * double(to[2 * k]));

@@ -65,7 +65,8 @@ MEDULLA_FN void exit_rows(const TableView& view, const float* weight, Put&& put)
     }
 }
 
-/// Calls put(row, positive, negative) with the coefficients of the contracted lobe for y >= 0 and y < 0.
+/// Calls put(row, positive, negative) with the coefficients of the contracted lobe for y >= 0 and y < 0; some of the
+/// last may come twice.
 template <class Put>
 MEDULLA_FN void exit_coefficients(const TableView& view, const float* weight, Put&& put) noexcept {
     exit_rows(view, weight, [&](std::uint32_t row, const RowSums(&sums)[4]) {

@@ -252,7 +252,7 @@ struct UnfoldedTables {
     }
     /// What -log(survival) is per absorption.  @param sigma, h as above
     MEDULLA_HOT float survival_length(Four sigma, float h) const noexcept {
-        const RowPoint row = offset.at(chord_coordinate(Four(h)));
+        const RowPoint row = offset.at(chord_coordinate(Same(h)));
         const float* r = survival + 4 * row.first;
         return sum_of(sigma * ((spread<0>(row.weight) * four_at(r) + spread<1>(row.weight) * four_at(r + 4)) +
                                (spread<2>(row.weight) * four_at(r + 8) + spread<3>(row.weight) * four_at(r + 12))));

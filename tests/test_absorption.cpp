@@ -290,7 +290,7 @@ TEST_CASE("Near field with the axis: the plain twin, Eq. 20 without it, the clea
     REQUIRE(prepare(p, plain.view, clear) == FurStatus::ok);
     for (const float h : {-0.8f, 0.2f}) {
         const LobeValues<3> a = near_lobes(absorbing, 0.4f, 0.1f, 1.0f, h), b = near_lobes(clear, 0.4f, 0.1f, 1.0f, h);
-        // Another axis rounds its factors to 12 bits.
+        // Another axis rounds its factors otherwise.
         for (int lobe = 0; lobe < lobe_count; ++lobe)
             CHECK(a.N[lobe][0] == Approx(b.N[lobe][0]).epsilon(2e-3).margin(1e-6));
     }

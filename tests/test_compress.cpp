@@ -176,7 +176,7 @@ TEST_CASE("Degeneracy is found again from a pack's bytes", "[compress]") {
     REQUIRE(result.degeneracy.size() == 4);
     for (std::size_t i = 0; i < 3; ++i) {
         // Even and odd components are orthogonal, and the solver worked in the same inner product but for bins and
-        // 12-bit rounding.
+        // the rounding of blocks.
         double sum = 0, least = 1;
         for (std::size_t p = 0; p < result.tables[i].parts.size(); ++p) {
             const PartReport& part = result.tables[i].parts[p];

@@ -9,7 +9,9 @@
 #include "medulla/lanes.hpp"
 #include "medulla/pack.hpp"
 
-#if defined(MEDULLA_SSE2) && defined(__GNUC__) && !defined(__CUDACC__) && !defined(__HIPCC__)
+#if defined(MEDULLA_SSE2) && defined(__GNUC__) && defined(__x86_64__) && !defined(__CUDACC__) && !defined(__HIPCC__)
+#define MEDULLA_ON_AVX2 __attribute__((target("avx2")))
+#define MEDULLA_HOT_ON_AVX2 __attribute__((target("avx2"), always_inline)) inline
 #include <immintrin.h>
 #endif
 
@@ -178,10 +180,7 @@ MEDULLA_FN RowSums row_sums(const TableView& table, std::uint32_t k, std::uint32
 }
 
 // Rows are long enough that a branch to AVX2 pays where the processor has it. No fused products: the bits are the same.
-#if defined(MEDULLA_SSE2) && defined(__GNUC__) && !defined(__CUDACC__) && !defined(__HIPCC__)
-#define MEDULLA_ON_AVX2 __attribute__((target("avx2")))
-#define MEDULLA_HOT_ON_AVX2 __attribute__((target("avx2"), always_inline)) inline
-
+#if defined(MEDULLA_ON_AVX2)
 /// Numbers of a block; of 8 bits the upper bytes alone, so that what they are multiplied with is scaled by
 /// unit_of<bits>.
 template <int bits>

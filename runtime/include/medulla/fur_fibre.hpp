@@ -125,7 +125,7 @@ struct FurFibre {
     TableView survival;                      ///< where the pack knows what the medulla's absorption leaves
     const UnfoldedTables* tables = nullptr;  ///< set by `unfold`: read instead of the factors
     /// Whether C^M from factors integrates to 1 to float precision, as unfolded ones do, or to that and what its dips
-    /// below 0 hold (docs/bcsdf.md, 'Right at the ends'): a third of the time for a near field from scratch.
+    /// below 0 hold (docs/bcsdf.md, 'Right at the ends'): a quarter of the time for a near field from scratch.
     bool exact_energy = true;
 };
 

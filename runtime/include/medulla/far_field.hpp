@@ -149,7 +149,7 @@ MEDULLA_FN float medulla_angle(const FarField<Channels>& far, float gamma) noexc
 }
 
 /// Gauss rule for `deviations` of a Gaussian under one piece of `length` [radians]: errors of 1e-5 and less
-/// (docs/bcsdf.md). A long piece sees the amplitude fall to 0 at the fibre's rim.
+/// (docs/bcsdf.md). A long piece sees the amplitude fall to 0 at the fibre's rim, or rise to a dense medulla's.
 MEDULLA_FN int rule_for(float deviations, float length) noexcept {
     const int amplitude = length < 1.2f ? 0 : (length < 2.4f ? 1 : 2);
     const int gaussian = deviations < 6 ? 0 : (deviations < 10 ? 1 : (deviations < 14 ? 2 : 3));
@@ -163,7 +163,6 @@ MEDULLA_FN void integrate_piece(const FarField<Channels>& far, int p, float a, f
                                 Visit&& visit) noexcept {
     const auto& parameters = far.fibre().parameters;
     const auto& m = far.near.longitudinal;
-    const float length = b - a;
     // Through the medulla (R sees none of it) and not so short that the ends' rounding in psi would show.
     const bool inside =
         p > 0 && std::abs(a + b) < 2 * far.gamma_rim && far.rim < 1 && far.gamma_high - far.gamma_low > 0.01f;
@@ -174,7 +173,7 @@ MEDULLA_FN void integrate_piece(const FarField<Channels>& far, int p, float a, f
         density *= at.dh / at.cos_i;
     }
     const float middle = 0.5f * (a + b), half = 0.5f * (b - a);
-    const int index = rule_for(density * (b - a), length) + far.quality;
+    const int index = rule_for(density * (b - a), b - a) + far.quality;
     const GaussRule rule = gauss_rule(index < 0 ? 0 : (index >= gauss_rules ? gauss_rules - 1 : index));
     for (int j = 0; 2 * j < rule.half; ++j) {
         const Four t = rule_nodes(rule, j, middle, half);
@@ -312,13 +311,13 @@ MEDULLA_FN void place_scattering_nodes(FarField<Channels>& far) noexcept {
     const float width = 1 - std::abs(parameters.g);  // of planar HG's peak [radians]
     const float per_panel = width > 0.2f ? 1.6f : (width > 0.1f ? 0.8f : 0.54f);
     const int index = (width > 0.1f ? 0 : 1) + far.quality;
-    const GaussRule rule = gauss_rule(index < 0 ? 0 : index), edge = gauss_rule(1);
+    const GaussRule rule = gauss_rule(index < 0 ? 0 : index), edge = gauss_rule(0);
     const float tau = far.near.longitudinal.absorption.medulla_extinction * parameters.kappa;
     // Where the medulla reaches the fibre's rim, F rises to 1 within the cos gamma_i that place_cuts grades by.
     const Inclination<float>& at = far.near.longitudinal.at;
     const float steep =
         std::fmin(std::sqrt(at.index_excess), at.inverse_index) * std::fmin(1.0f, 2 * parameters.layers);
-    const float rise = far.rim < 1 ? 4.0f : std::fmax(3 * steep, 0.01f), dense = tau > 4 ? 4 / tau : 4.0f;
+    const float rise = far.rim < 1 ? 4.0f : std::fmax(2 * steep, 0.01f), dense = tau > 4 ? 4 / tau : 4.0f;
     const float edge_width = std::fmin(rise, dense);
     float most = 0, low = a, high = b;
     if (edge_width < 1) {

@@ -85,8 +85,8 @@ MEDULLA_FN SplineWeights<float> lagrange_weights(const float (&x)[4], float at) 
 /// An axis of a pack, from 0, with the weights of each of its spans, cubics in the distance from its middle
 /// [stretches]. Even stretches say which span a value lies in: where a breakpoint is not the end of one (those of exits
 /// are, being whole bins apart), the nearest end stands in for it, off by at most a 32nd of a span. There the cubics of
-/// two neighbours differ by the cube of that in a spline (default pack: 1e-8 of a lobe), through nodes by a tenth of what
-/// they err between them.
+/// two neighbours differ by the cube of that in a spline (default pack: 1e-8 of a lobe), through nodes by a tenth of
+/// what they err between them.
 template <std::uint32_t Most, std::int32_t most_stretches>
 struct CubicAxis {
     std::uint32_t spans = 0;

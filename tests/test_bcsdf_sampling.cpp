@@ -302,8 +302,9 @@ TEST_CASE("white furnace: near and far return what the model's energies say", "[
                                       furnace(far, far.near.longitudinal, fibre, far.nodes > 0)};
             const double energy[2] = {white_energy(fibre, double(theta_i), double(h)), mean_energy};
             // Near: float, and lobes that carry less than 2^-24. Far: Gauss rules err by 1e-5 at most on a Gaussian
-            // under one piece (rule_for), and by as much on the amplitude, in pieces that follow its scales.
-            const double above[2] = {2e-6, 2e-5}, below[2] = {2e-6, 2e-5};
+            // under one piece (rule_for), and by as much on the amplitude, in pieces that follow its scales; 1e-5 is
+            // taken off (kept_of_average).
+            const double above[2] = {2e-6, 1e-5}, below[2] = {2e-6, 3e-5};
             for (int k = 0; k < 2; ++k) {
                 least[how + k] = std::min(least[how + k], whole[k].whole);
                 most[how + k] = std::max(most[how + k], whole[k].whole);
@@ -317,7 +318,7 @@ TEST_CASE("white furnace: near and far return what the model's energies say", "[
                 CHECK(energy[k] <= 1 + 1e-12);
                 // C^M integrates to 1 to 2e-6, its dips below 0 held at 0 and all.
                 CHECK(std::abs(whole[k].excess) < 2e-6);
-                CHECK(whole[k].whole <= 1 + (k ? 1e-5 : 1e-6));
+                CHECK(whole[k].whole <= 1 + (k ? 0 : 1e-6));  // near: float sums of lobes that add up to 1
             }
         }
     }

@@ -405,9 +405,9 @@ MEDULLA_FN void average_unscattered(const FarField<Channels>& far, int p, float 
 /// N of TTs and TRTs averaged over the range: the lobe's shift and its offset change together with h, so each node
 /// contracts the h axis once and reads two exits.
 template <int Channels>
-MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, float (&N)[2][Channels]) noexcept {
-    for (int p = 0; p < 2; ++p)
-        for (int c = 0; c < Channels; ++c) N[p][c] = 0;
+MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, float (&TTs)[Channels],
+                                  float (&TRTs)[Channels]) noexcept {
+    for (int c = 0; c < Channels; ++c) TTs[c] = TRTs[c] = 0;
     const MaterialTable& table = far.fibre().azimuthal;
     const UnfoldedTables* unfolded = far.fibre().tables;
     Contraction contraction;
@@ -416,17 +416,20 @@ MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, floa
         if (unfolded != nullptr) {
             const TwoDensities D = azimuthal_densities(*unfolded, far.near.longitudinal.sigma_point, n.offset,
                                                        n.side * (phi - n.centre[0]), n.side * (phi - n.centre[1]));
-            for (int c = 0; c < Channels; ++c) N[0][c] += n.A[0][c] * D.TTs, N[1][c] += n.A[1][c] * D.TRTs;
+            for (int c = 0; c < Channels; ++c) TTs[c] += n.A[0][c] * D.TTs, TRTs[c] += n.A[1][c] * D.TRTs;
             continue;
         }
         contract_axis(table.view, table.last_axis, last_point(table, n.offset), far.sigma_weight, contraction.weight);
         contraction.inverse_integral = inverse_integral(table.view, contraction.weight);
-        for (int p = 0; p < 2; ++p) {
-            const float D = lobe(table, contraction, n.side * (phi - n.centre[p]));
-            for (int c = 0; c < Channels; ++c) N[p][c] += n.A[p][c] * D;
-        }
+        const float D[2] = {lobe(table, contraction, n.side * (phi - n.centre[0])),
+                            lobe(table, contraction, n.side * (phi - n.centre[1]))};
+        for (int c = 0; c < Channels; ++c) TTs[c] += n.A[0][c] * D[0], TRTs[c] += n.A[1][c] * D[1];
     }
 }
+
+/// What is kept of an average: its quadrature gives at most 1e-5 more than the model has (docs/bcsdf.md, 'Right at the
+/// ends'), and white fur must not shine.
+inline constexpr float kept_of_average = 1 - 1e-5f;
 
 /// M and N of every lobe at (theta_r, phi) [radians]; all 0 outside theta_r in [-pi/2, pi/2] or for |phi| > 1e4.
 template <int Channels>
@@ -436,12 +439,11 @@ MEDULLA_FN LobeValues<Channels> FarField<Channels>::lobes(float theta_r, float p
     if (single) return near.lobes(theta_r, phi);
     const float turned = wrap_angle(phi);
     longitudinal_lobes(fibre(), near.longitudinal, theta_r, turned, nodes > 0, result);
-    for (int p = 0; p < 3; ++p) average_unscattered(*this, p, turned, result.N[p]);
-    if (nodes == 0) return result;
-    float N[2][Channels];
-    average_scattered(*this, turned, N);
-    for (int p = 0; p < 2; ++p)
-        for (int c = 0; c < Channels; ++c) result.N[p + 3][c] = N[p][c];
+    float N[lobe_count][Channels] = {};
+    for (int p = 0; p < 3; ++p) average_unscattered(*this, p, turned, N[p]);
+    if (nodes > 0) average_scattered(*this, turned, N[3], N[4]);
+    for (int p = 0; p < lobe_count; ++p)
+        for (int c = 0; c < Channels; ++c) result.N[p][c] = kept_of_average * N[p][c];
     return result;
 }
 

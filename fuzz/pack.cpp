@@ -1,6 +1,6 @@
-// libFuzzer: bytes -> open_pack -> everything that a renderer asks of a pack, lookups all finite, and of fibres that read
-// it (whose products of two lobes of an absurd pack may not be). The checksum is mended in half of the inputs (by their
-// first byte), so that the checks behind it are reached.
+// libFuzzer: bytes -> open_pack -> everything that a renderer asks of a pack, lookups all finite, and of fibres that
+// read it (whose products of two lobes of an absurd pack may not be). The checksum is mended in half of the inputs (by
+// their first byte), so that the checks behind it are reached.
 #include <cmath>
 #include <cstdlib>
 #include <cstring>

@@ -64,7 +64,6 @@ std::vector<double> survival_lengths(const Table& azimuthal);
 /// The polynomial through (x, y) at another place.
 double extrapolate(const std::vector<double>& x, const std::vector<double>& y, double to);
 
-
 /// Lobe of one side of a longitudinal table, or the azimuthal table, as an array [cells of that side][bins].
 std::vector<double> side_lobes(const Table& table, std::size_t side);
 

@@ -8,6 +8,7 @@
 #include "analytic_pack.hpp"
 #include "fur_reference.hpp"
 #include "medulla/far_field.hpp"
+#include "medulla/queries.hpp"
 #include "medulla/sampling.hpp"
 #include "sim2d/disc_deterministic.hpp"
 #include "sim2d/disc_single.hpp"
@@ -317,8 +318,14 @@ TEST_CASE("Unfolded tables with the axis: the factors' lobes, energies and far f
                 near_field(fibre, theta_i, h, a), near_field(unfolded, theta_i, h, b);
                 for (int lobe = 3; lobe < lobe_count; ++lobe)
                     CHECK(b.energy.A[lobe][1] == Approx(a.energy.A[lobe][1]).epsilon(1e-4).margin(1e-7));
+                float theta_is[24], hs[24], theta_rs[24], phis[24];
+                for (int i = 0; i < 24; ++i)
+                    theta_is[i] = theta_i, hs[i] = h, theta_rs[i] = 0.2f, phis[i] = -3.1f + 0.26f * float(i);
+                Colour<3> batch[24];
+                eval(unfolded, 24, theta_is, hs, theta_rs, phis, batch);
                 for (int i = 0; i < 24; ++i) {
-                    const float phi = -3.1f + 0.26f * float(i);
+                    const float phi = phis[i];
+                    CHECK(batch[i].value[1] == Approx(b.eval(0.2f, phi).value[1]).epsilon(1e-5));
                     const LobeValues<3> x = a.lobes(0.2f, phi), y = b.lobes(0.2f, phi);
                     for (int lobe = 3; lobe < lobe_count; ++lobe) {
                         difference += std::pow(double(x.N[lobe][1]) - double(y.N[lobe][1]), 2);

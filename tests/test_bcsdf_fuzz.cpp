@@ -76,7 +76,7 @@ TEST_CASE("far field of a dense medulla that reaches the rim, next to grazing li
 
 TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
     const analytic::AnalyticPack pack;
-    const char* wanted = std::getenv("MEDULLA_FUZZ");  // fibres; each is asked 85 times, near, far, by samples
+    const char* wanted = std::getenv("MEDULLA_FUZZ");  // fibres; each is asked 93 times, near, far, by samples
     const long fibres = wanted ? std::atol(wanted) : 2500;
     Inputs in(7);
     const auto tables = std::make_unique<UnfoldedTables>();
@@ -134,11 +134,18 @@ TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
                 check(far_sampler.pdf(in.any(-1.5f, 1.5f), in.any(-3, 3)), "far pdf");
             }
         }
+        float query[4][8];
+        for (float(&of)[8] : query)
+            for (float& x : of) x = in.any(-1.5707f, 1.5707f);
+        Colour<3> each[8];
+        eval(fibre, 8, query[0], query[1], query[2], query[3], each);
+        for (const Colour<3>& at : each)
+            for (float x : at.value) check(x, "queries");
         const Vector<float> a = {in.any(-1, 1), in.any(-1, 1), in.any(-1, 1)},
                             b = {in.any(-1, 1), in.any(-1, 1), in.any(-1, 1)};
         for (float x : eval(fibre, a, b, in.any(-1, 1)).value) check(x, "directions");
     }
-    if (wanted) std::printf("%ld inputs, %ld values, %ld of them > 0, %ld bad\n", 85 * fibres, evaluated, bright, bad);
+    if (wanted) std::printf("%ld inputs, %ld values, %ld of them > 0, %ld bad\n", 93 * fibres, evaluated, bright, bad);
     CHECK(bad == 0);
     CHECK(usable_fibres > fibres / 4);
     CHECK(unfolded > fibres / 64);

@@ -155,29 +155,4 @@ MEDULLA_FN void eval(const NearField<Channels>& near, int count, const float* th
     run_widest([&] { detail::eval_exits(near, count, theta_r, phi, S); });
 }
 
-namespace detail {
-
-template <int Channels>
-MEDULLA_FN void eval_queries(const FurFibre<Channels>& fibre, int count, const float* theta_i, const float* h,
-                             const float* theta_r, const float* phi, Colour<Channels>* S) noexcept {
-    NearField<Channels> near;
-    for (int i = 0; i < count; ++i) {
-        if (i == 0 || !(theta_i[i] == theta_i[i - 1]))
-            near_field(fibre, theta_i[i], h[i], near);
-        else if (!(h[i] == h[i - 1]))
-            set_offset(near, h[i]);
-        S[i] = near.eval(theta_r[i], phi[i]);
-    }
-}
-
-}  // namespace detail
-
-/// S of Eq. 12 of `count` queries, each with its own light, offset and exit, as eval(fibre, theta_i[i], theta_r[i],
-/// phi[i], h[i]). What neighbours have in common, theta_i or theta_i and h, is prepared once.
-template <int Channels>
-MEDULLA_FN void eval(const FurFibre<Channels>& fibre, int count, const float* theta_i, const float* h,
-                     const float* theta_r, const float* phi, Colour<Channels>* S) noexcept {
-    run_widest([&] { detail::eval_queries(fibre, count, theta_i, h, theta_r, phi, S); });
-}
-
 }  // namespace medulla

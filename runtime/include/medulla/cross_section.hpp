@@ -48,14 +48,14 @@ struct Path {
 
 /// F_1 = mean over polarisations of R + (1-R)^2 R / (1-R^2) = 2R / (1+R), F = l F_1 / (1 + (l-1) F_1) (Eq. 13).
 /// Differences are expanded so that n -> 1 and cos_i -> 0 lose no digits (docs/bcsdf.md, 'Fresnel').
-/// T is S, or several S abreast.
+/// T is S, or several S abreast; I is either.
 /// @param index_excess n^2 - 1  @param cos_i cosine of incidence
 /// @param x sqrt(index_excess + cos_i^2) = n times the cosine of refraction
-template <class T, class S>
-MEDULLA_FN Cuticle<T> cuticle(S layers, S index_excess, T cos_i, T x) noexcept {
+template <class T, class S, class I>
+MEDULLA_FN Cuticle<T> cuticle(S layers, I index_excess, T cos_i, T x) noexcept {
     // Fewer layers than 1e-30 would be seen at h = 1 alone, where T1 is 0, and there 1 / (layers F1) may overflow.
     if (!(layers > S(1e-30))) return {T(S(0)), T(S(1))};
-    const T one = T(S(1)), m = T(index_excess), index2 = T(S(1) + index_excess);
+    const T one = T(S(1)), m = T(index_excess), index2 = T(I(S(1)) + index_excess);
     const T s = cos_i + x, p = index2 * cos_i + x, inverse = one / (s * p), inverse_s = p * inverse,
             inverse_p = s * inverse;
     const T rs = m * inverse_s * inverse_s;
@@ -70,9 +70,10 @@ MEDULLA_FN Cuticle<T> cuticle(S layers, S index_excess, T cos_i, T x) noexcept {
     return {F1 * whole, T1 * whole};
 }
 
+/// @param at of all, or of each of several rays abreast
 /// @param cos_i cos gamma_i = sqrt(1 - h^2), given beside h because the caller often has it without cancellation
-template <class T, class S>
-MEDULLA_FN Path<T> trace(const Inclination<S>& at, S kappa, S layers, T h, T cos_i) noexcept {
+template <class T, class S, class I>
+MEDULLA_FN Path<T> trace(const Inclination<I>& at, S kappa, S layers, T h, T cos_i) noexcept {
     Path<T> path;
     const T x = square_root(T(at.index_excess) + cos_i * cos_i), zero = T(S(0));
     const T sin_t = h * T(at.inverse_index), cos_t = x * T(at.inverse_index);
@@ -116,17 +117,18 @@ struct Absorption {
     T T_b[Channels];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
 };
 
+/// @param inverse_cos_t of one inclination or of several abreast
 /// @param tabled the tables know what the medulla absorbs of scattered light: T_b leaves it out
-template <int Channels, class T>
-MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, T>& p, T inverse_cos_t,
+template <int Channels, class S, class T>
+MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, S>& p, T inverse_cos_t,
                                               bool tabled = false) noexcept {
     Absorption<Channels, T> a;
-    const T medulla = tabled ? T(0) : p.kappa * p.sigma_ma * inverse_cos_t;
-    a.medulla_extinction = (p.sigma_ma + p.sigma_ms) * inverse_cos_t;
-    a.medulla_scattering = p.sigma_ms * inverse_cos_t;
+    const T medulla = tabled ? T(S(0)) : T(p.kappa * p.sigma_ma) * inverse_cos_t;
+    a.medulla_extinction = T(p.sigma_ma + p.sigma_ms) * inverse_cos_t;
+    a.medulla_scattering = T(p.sigma_ms) * inverse_cos_t;
     for (int c = 0; c < Channels; ++c) {
-        a.cortex[c] = p.sigma_ca[c] * inverse_cos_t;
-        a.T_b[c] = -(medulla + (T(1) - p.kappa) * a.cortex[c]);
+        a.cortex[c] = T(p.sigma_ca[c]) * inverse_cos_t;
+        a.T_b[c] = -(medulla + T(S(1) - p.kappa) * a.cortex[c]);
     }
     real_math::exponentials(a.T_b);
     return a;

@@ -2,10 +2,8 @@
 // Rests on Yan et al. 2017, Tables 1 and 4; lengths are in fibre radii, angles in radians.
 #pragma once
 
-#include <cstdint>
-#include <cstring>
-
 #include "medulla/config.hpp"
+#include "medulla/lanes.hpp"
 
 namespace medulla {
 
@@ -124,18 +122,6 @@ constexpr const FurPreset* find_preset(const char* name) noexcept {
     }
     return nullptr;
 }
-
-namespace detail {
-
-/// |x| <= limit, false for a NaN also under -ffast-math: compared as bits, limit > 0.
-MEDULLA_FN bool within(float x, float limit) noexcept {
-    std::uint32_t bits, limit_bits;
-    std::memcpy(&bits, &x, sizeof bits);
-    std::memcpy(&limit_bits, &limit, sizeof limit_bits);
-    return (bits & 0x7fffffffu) <= limit_bits;
-}
-
-}  // namespace detail
 
 /// Checks every parameter against its range.
 template <int Channels>

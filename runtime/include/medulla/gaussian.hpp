@@ -238,9 +238,9 @@ struct TruncatedGaussians {
     MEDULLA_FN TruncatedGaussian<float> operator[](int p) const noexcept {
         return {lane(origin, p), lane(deviation, p), lane(inverse, p), lane(beyond, p), lane(peak, p)};
     }
-    MEDULLA_HOT Four pdf(float theta) const noexcept { return peak * real_math::exponential(exponent(theta)); }
-    MEDULLA_HOT Four exponent(float theta) const noexcept {
-        const Four d = magnitude(Four(theta) - origin) * inverse;
+    MEDULLA_HOT Four pdf(Four theta) const noexcept { return peak * real_math::exponential(exponent(theta)); }
+    MEDULLA_HOT Four exponent(Four theta) const noexcept {
+        const Four d = magnitude(theta - origin) * inverse;
         return Four(-0.5f) * d * (d + beyond + beyond);
     }
 };
@@ -248,10 +248,13 @@ struct TruncatedGaussians {
 /// As truncated_gaussian(centre, deviation), lane by lane.
 MEDULLA_FN TruncatedGaussians truncated_gaussians(Four centre, Four deviation) noexcept {
     const Four edge(float(pi / 2)), zero(0.0f);
-    const Four inverse = Four(1.0f) / deviation, a = (-edge - centre) * inverse, b = (edge - centre) * inverse;
-    const Four mass = detail::normal_mass(choose(a < zero, a, zero), choose(b > zero, b, zero));
-    TruncatedGaussians g = {centre, deviation, inverse, zero, Four(0.39894228f) * inverse / mass};
-    if (!any(a > zero) && !any(b < zero)) return g;
+    const Four inverse = Four(1.0f) / deviation, away = magnitude(centre);
+    const Four near = (edge - away) * inverse, far = (edge + away) * inverse;
+    // Beyond 6 deviations lies 1e-9 of the mass.
+    const Four beyond_near = detail::normal_half_mass(greater(near, zero)),
+               beyond_far = any(far < Four(6.0f)) ? detail::normal_half_mass(far) : Four(0.5f);
+    TruncatedGaussians g = {centre, deviation, inverse, zero, Four(0.39894228f) * inverse / (beyond_near + beyond_far)};
+    if (!any(near < zero)) return g;
     TruncatedGaussian<float> each[4];
     for (int i = 0; i < 4; ++i) each[i] = truncated_gaussian(lane(centre, i), lane(deviation, i));
     g.origin = Four(each[0].origin, each[1].origin, each[2].origin, each[3].origin);
@@ -297,6 +300,13 @@ template <class V>
 MEDULLA_HOT V joint_pdf(const TruncatedGaussian<float>& M, const WrappedGaussian<float>& D, V theta, V delta) noexcept {
     if (!D.narrow()) return M.pdf_of(theta) * D.pdf_of(delta);
     return V(M.peak * D.peak) * real_math::exponential(M.exponent_of(theta) + D.exponent_of(delta));
+}
+
+/// The same of one lobe, lane by lane of M. @param delta phi - centre
+MEDULLA_HOT Four joint_pdf(const TruncatedGaussians& M, const WrappedGaussian<float>& D, Four theta,
+                           Four delta) noexcept {
+    if (!D.narrow()) return M.pdf(theta) * D.pdf_of(delta);
+    return M.peak * Four(D.peak) * real_math::exponential(M.exponent(theta) + D.exponent_of(delta));
 }
 
 MEDULLA_FN WrappedGaussians wrapped_gaussians(float a, float b, float c) noexcept {

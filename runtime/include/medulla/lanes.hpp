@@ -25,6 +25,18 @@
 
 namespace medulla {
 
+namespace detail {
+
+/// |x| <= limit, false for a NaN also under -ffast-math: compared as bits, limit > 0.
+MEDULLA_FN bool within(float x, float limit) noexcept {
+    std::uint32_t bits, limit_bits;
+    std::memcpy(&bits, &x, sizeof bits);
+    std::memcpy(&limit_bits, &limit, sizeof limit_bits);
+    return (bits & 0x7fffffffu) <= limit_bits;
+}
+
+}  // namespace detail
+
 #if defined(MEDULLA_SSE2)
 struct Four {
     __m128 v;
@@ -44,6 +56,13 @@ struct FourMask {
 };
 inline FourMask operator<(Four a, Four b) noexcept { return {_mm_cmplt_ps(a.v, b.v)}; }
 inline FourMask operator>(Four a, Four b) noexcept { return {_mm_cmpgt_ps(a.v, b.v)}; }
+inline FourMask operator&(FourMask a, FourMask b) noexcept { return {_mm_and_ps(a.v, b.v)}; }
+/// detail::within, lane by lane.
+inline FourMask within(Four a, float limit) noexcept {
+    const __m128i bits = _mm_and_si128(_mm_castps_si128(a.v), _mm_set1_epi32(0x7fffffff));
+    const __m128i end = _mm_add_epi32(_mm_castps_si128(_mm_set1_ps(limit)), _mm_set1_epi32(1));
+    return {_mm_castsi128_ps(_mm_cmplt_epi32(bits, end))};
+}
 inline Four choose(FourMask mask, Four yes, Four no) noexcept {
     return Four(_mm_or_ps(_mm_and_ps(mask.v, yes.v), _mm_andnot_ps(mask.v, no.v)));
 }
@@ -53,6 +72,8 @@ inline Four greater(Four a, Four b) noexcept { return Four(_mm_max_ps(a.v, b.v))
 inline Four lesser(Four a, Four b) noexcept { return Four(_mm_min_ps(a.v, b.v)); }
 /// 0 where the mask is set.
 inline Four zero_where(FourMask mask, Four a) noexcept { return Four(_mm_andnot_ps(mask.v, a.v)); }
+/// 0 where the mask is not set.
+inline Four only_where(FourMask mask, Four a) noexcept { return Four(_mm_and_ps(mask.v, a.v)); }
 inline Four square_root(Four a) noexcept { return Four(_mm_sqrt_ps(a.v)); }
 inline Four magnitude(Four a) noexcept { return Four(_mm_andnot_ps(_mm_set1_ps(-0.0f), a.v)); }
 /// |x| with the sign of y.
@@ -132,6 +153,13 @@ MEDULLA_FN FourMask operator<(Four a, Four b) noexcept {
     return {{a.v[0] < b.v[0], a.v[1] < b.v[1], a.v[2] < b.v[2], a.v[3] < b.v[3]}};
 }
 MEDULLA_FN FourMask operator>(Four a, Four b) noexcept { return b < a; }
+MEDULLA_FN FourMask within(Four a, float limit) noexcept {
+    return {{detail::within(a.v[0], limit), detail::within(a.v[1], limit), detail::within(a.v[2], limit),
+             detail::within(a.v[3], limit)}};
+}
+MEDULLA_FN FourMask operator&(FourMask a, FourMask b) noexcept {
+    return {{a.v[0] && b.v[0], a.v[1] && b.v[1], a.v[2] && b.v[2], a.v[3] && b.v[3]}};
+}
 MEDULLA_FN Four choose(FourMask mask, Four yes, Four no) noexcept {
     return each([&](int i) { return mask.v[i] ? yes.v[i] : no.v[i]; });
 }
@@ -141,6 +169,7 @@ MEDULLA_FN Four greater(Four a, Four b) noexcept { return choose(a > b, a, b); }
 MEDULLA_FN Four lesser(Four a, Four b) noexcept { return choose(a < b, a, b); }
 /// 0 where the mask is set.
 MEDULLA_FN Four zero_where(FourMask mask, Four a) noexcept { return choose(mask, Four(0.0f), a); }
+MEDULLA_FN Four only_where(FourMask mask, Four a) noexcept { return choose(mask, a, Four(0.0f)); }
 MEDULLA_FN Four square_root(Four a) noexcept {
     return each([&](int i) { return std::sqrt(a.v[i]); });
 }
@@ -260,6 +289,10 @@ template <class F>
 __attribute__((target("avx2"), flatten)) void run_on_avx2(const F& f) noexcept {
     f();
 }
+template <class F>
+__attribute__((target("avx2,fma"), flatten)) void run_on_fma(const F& f) noexcept {
+    f();
+}
 }  // namespace detail
 /// f(), compiled twice: for what the renderer is built for and, taken where the processor has it, for AVX2. For work of
 /// microseconds, not for one number.
@@ -270,10 +303,22 @@ void run_widest(const F& f) noexcept {
 #endif
     f();
 }
+/// The same with FMA: what is MEDULLA_WIDE is inlined, and a compiler that fuses products may, and so round less often.
+template <class F>
+void run_fused(const F& f) noexcept {
+#if !defined(__FMA__)
+    if (has_wide()) return detail::run_on_fma(f);
+#endif
+    f();
+}
 #else
 /// f(), as the renderer is built.
 template <class F>
 MEDULLA_FN void run_widest(const F& f) noexcept {
+    f();
+}
+template <class F>
+MEDULLA_FN void run_fused(const F& f) noexcept {
     f();
 }
 #endif

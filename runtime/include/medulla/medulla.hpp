@@ -47,6 +47,7 @@
 #include "medulla/lookup.hpp"
 #include "medulla/pack.hpp"
 #include "medulla/phase.hpp"
+#include "medulla/queries.hpp"
 #include "medulla/real_math.hpp"
 #include "medulla/sampling.hpp"
 #include "medulla/unfolded.hpp"

@@ -55,15 +55,31 @@ MEDULLA_FN T angle(T sine, T cosine) noexcept {
     return with_sign(choose(steep, T(1.57079633f) - a, a), sine);
 }
 
-/// Sine and cosine in [-pi/2, pi/2] from the half angle, |x/2| <= pi/4, by Cephes' polynomials; (c - s)(c + s) keeps
-/// the cosine's digits near pi/2.
+/// Cephes' polynomials of sine and cosine, |y| <= pi/4.
+template <class T>
+MEDULLA_FN SineCosine<T> sine_cosine_about_0(T y) noexcept {
+    const T z = y * y;
+    return {y + y * z * (T(-1.6666654611e-1f) + z * (T(8.3321608736e-3f) + z * T(-1.9515295891e-4f))),
+            T(1.0f) - T(0.5f) * z +
+                z * z * (T(4.166664568298827e-2f) + z * (T(-1.388731625493765e-3f) + z * T(2.443315711809948e-5f)))};
+}
+
+/// Sine and cosine in [-pi/2, pi/2] from the half angle; (c - s)(c + s) keeps the cosine's digits near pi/2, to 6e-8 of
+/// 1.
 template <class T>
 MEDULLA_FN SineCosine<T> sine_cosine(T x) noexcept {
-    const T y = T(0.5f) * x, z = y * y;
-    const T s = y + y * z * (T(-1.6666654611e-1f) + z * (T(8.3321608736e-3f) + z * T(-1.9515295891e-4f)));
-    const T c = T(1.0f) - T(0.5f) * z +
-                z * z * (T(4.166664568298827e-2f) + z * (T(-1.388731625493765e-3f) + z * T(2.443315711809948e-5f)));
+    const auto [s, c] = sine_cosine_about_0(T(0.5f) * x);
     return {T(2.0f) * s * c, (c - s) * (c + s)};
+}
+
+/// Cosine in [-pi/2, pi/2] to 2e-7 of itself, however small: beyond pi/4 it is the sine of what is missing to pi/2,
+/// which is float(pi/2) less x, exactly, and the 4.4e-8 that float(pi/2) is too much.
+template <class T>
+MEDULLA_FN T cosine(T x) noexcept {
+    const T a = magnitude(x);
+    const auto steep = a > T(0.78539816f);
+    const auto [s, c] = sine_cosine_about_0(choose(steep, (T(1.57079637f) - a) - T(4.37113883e-8f), a));
+    return choose(steep, s, c);
 }
 
 }  // namespace polynomial
@@ -129,6 +145,9 @@ MEDULLA_FN SineCosine<T> sine_cosine(T x) noexcept {
 }
 MEDULLA_FN SineCosine<float> sine_cosine(float x) noexcept { return polynomial::sine_cosine(x); }
 MEDULLA_FN SineCosine<Four> sine_cosine(Four x) noexcept { return polynomial::sine_cosine(x); }
+
+/// Cosines of angles in [-pi/2, pi/2].
+MEDULLA_FN Four cosine(Four x) noexcept { return polynomial::cosine(x); }
 
 }  // namespace real_math
 }  // namespace medulla

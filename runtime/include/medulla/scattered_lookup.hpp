@@ -20,6 +20,34 @@ MEDULLA_HOT float blend_sides(BackForward side, float forwardness) noexcept {
     return (1 - forwardness) * side.back + forwardness * side.forward;
 }
 
+/// Four queries, each with its own near field and exit.
+struct FourLookups {
+    Four sigma;                ///< what tables.sigma_place gave
+    Four offset, inclination;  ///< chord_coordinate of h [medulla radii] and of |theta_i| [pi/2]
+    Four y[2], theta_r, phi;   ///< as scattered_densities has them
+};
+/// Densities of TTs and TRTs of each.
+struct FourDensities {
+    Four M, D[2];
+};
+
+namespace detail {
+
+/// @param N lanes to be added up  @param M back and forward, twice, to be added up
+MEDULLA_HOT FourDensities four_densities(Four (&N)[2][4], Four (&M)[4], Four phi) noexcept {
+    const Four zero(0.0f), forwardness = Four(2.0f) * magnitude(turns_of(phi));
+    FourDensities at;
+    for (int p = 0; p < 2; ++p) {
+        transpose(N[p][0], N[p][1], N[p][2], N[p][3]);
+        at.D[p] = greater(zero, (N[p][0] + N[p][1]) + (N[p][2] + N[p][3]));  // a NaN stays one
+    }
+    transpose(M[0], M[1], M[2], M[3]);
+    at.M = (Four(1.0f) - forwardness) * greater(zero, M[0] + M[2]) + forwardness * greater(zero, M[1] + M[3]);
+    return at;
+}
+
+}  // namespace detail
+
 #if defined(MEDULLA_WIDE)
 namespace detail {
 
@@ -79,6 +107,16 @@ MEDULLA_WIDE inline __m128 wide_azimuthal(const UnfoldedTables& tables, const fl
     return sum_of_halves(
         _mm256_fmadd_ps(lower, wide_blend(offset, row, step), _mm256_mul_ps(upper, wide_blend(offset, row + 8, step))));
 }
+/// C^M at exit i: back and forward twice, yet to be added up. @param rows of theta_i  @param theta weights of theta_i
+MEDULLA_WIDE inline __m128 wide_longitudinal(const UnfoldedTables& tables, const float* rows, __m128 theta,
+                                             const WidePlaces& places, int i) noexcept {
+    const std::uint32_t exit = tables.longitude.start[places.stretch[i]];
+    const __m128 w =
+        wide_weights(tables.longitude.weights[exit], Same(places.place[i]) - Same(tables.longitude.middle[exit]));
+    const float* row = rows + 2 * std::size_t(places.half[i] + exit);
+    const __m256 sides = wide_blend(wide_rows(theta), row, 4 * std::size_t(tables.longitude_rows));
+    return sum_of_halves(_mm256_mul_ps(lanes_of(w, _mm256_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3)), sides));
+}
 /// Sums of the lanes of each, in lanes 0 and 1, >= 0; a NaN stays one.
 MEDULLA_WIDE inline __m128 held_sums(__m128 a, __m128 b) noexcept {
     const __m128 ab = _mm_add_ps(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b));
@@ -104,7 +142,7 @@ MEDULLA_WIDE inline TwoDensities wide_lookup(const UnfoldedTables& tables, Four 
 MEDULLA_WIDE inline TwoDensities wide_lookup(const UnfoldedTables& tables, float sigma, float h, float y0,
                                              float y1) noexcept {
     const AxisPlace at = tables.offset.place(chord_coordinate(Same(h)));  // first, as it takes longest
-    return wide_lookup(tables, at, wide_weights(tables.sigma_weights, tables.sigma_place(sigma)), y0, y1);
+    return wide_lookup(tables, at, wide_weights(tables.sigma_weights, tables.sigma_place(Same(sigma))), y0, y1);
 }
 
 MEDULLA_WIDE inline ScatteredDensities wide_exit(const UnfoldedTables& tables, const AzimuthalPoint& around,
@@ -118,16 +156,34 @@ MEDULLA_WIDE inline ScatteredDensities wide_exit(const UnfoldedTables& tables, c
     const __m256 sigma = _mm256_set_m128(around.sigma.v, around.sigma.v);
     const __m128 N = held_sums(wide_azimuthal(tables, around.rows, offset, sigma, places, 0),
                                wide_azimuthal(tables, around.rows, offset, sigma, places, 1));
-    const std::uint32_t exit = tables.longitude.start[places.stretch[2]];
-    const __m128 w =
-        wide_weights(tables.longitude.weights[exit], Same(places.place[2]) - Same(tables.longitude.middle[exit]));
-    const float* row = along.rows + 2 * std::size_t(places.half[2] + exit);
-    const __m256 sides = wide_blend(wide_rows(along.weight.v), row, 4 * std::size_t(tables.longitude_rows));
-    const __m128 M = sum_of_halves(_mm256_mul_ps(lanes_of(w, _mm256_setr_epi32(0, 0, 1, 1, 2, 2, 3, 3)), sides));
+    const __m128 M = wide_longitudinal(tables, along.rows, along.weight.v, places, 2);
     ScatteredDensities at;
     at.M = blend_sides(UnfoldedTables::both_of(Four(M)), places.place[3]);
     at.D[0] = _mm_cvtss_f32(N), at.D[1] = _mm_cvtss_f32(_mm_shuffle_ps(N, N, 1));
     return at;
+}
+
+MEDULLA_WIDE inline FourDensities wide_exits(const UnfoldedTables& tables, const FourLookups& q) noexcept {
+    const auto around_rows = std::int32_t(tables.azimuth_rows), along_rows = std::int32_t(tables.longitude_rows);
+    const WidePlaces around[2] = {wide_places(q.y[0], Four(tables.azimuth_scale), _mm_set1_epi32(around_rows)),
+                                  wide_places(q.y[1], Four(tables.azimuth_scale), _mm_set1_epi32(around_rows))};
+    const WidePlaces along = wide_places(q.theta_r, Four(tables.longitude_scale), _mm_set1_epi32(along_rows));
+    AxisPlace offset[4], inclination[4];
+    tables.offset.places(q.offset, offset), tables.inclination.places(q.inclination, inclination);
+    alignas(16) float place[4];
+    store_four(q.sigma, place);
+    Four N[2][4], M[4];
+    for (int k = 0; k < 4; ++k) {
+        const WideRows h = wide_rows(wide_weights(tables.offset.weights[offset[k].span], offset[k].along));
+        const __m128 sigma = wide_weights(tables.sigma_weights, Same(place[k]));
+        const __m256 twice = _mm256_set_m128(sigma, sigma);
+        const float* rows = tables.azimuthal_rows(offset[k]);
+        for (int p = 0; p < 2; ++p) N[p][k] = Four(wide_azimuthal(tables, rows, h, twice, around[p], k));
+        M[k] = Four(wide_longitudinal(
+            tables, tables.longitudinal_rows(inclination[k]),
+            wide_weights(tables.inclination.weights[inclination[k].span], inclination[k].along), along, k));
+    }
+    return four_densities(N, M, q.phi);
 }
 
 }  // namespace detail
@@ -167,6 +223,31 @@ MEDULLA_HOT ScatteredDensities scattered_densities(const UnfoldedTables& tables,
     for (int p = 0; p < 2; ++p) at.D[p] = tables.azimuthal_density(around, tables.azimuth_exit(places, p));
     at.M = blend_sides(tables.longitudinal_density(along, tables.longitude_exit(places, 2)), places.place[3]);
     return at;
+}
+
+/// The same of four queries.
+MEDULLA_HOT FourDensities scattered_densities(const UnfoldedTables& tables, const FourLookups& q) noexcept {
+#if defined(MEDULLA_WIDE)
+    if (has_wide()) return detail::wide_exits(tables, q);
+#endif
+    const ExitPlaces around[2] = {exit_places(turns_of(q.y[0]), Four(tables.azimuth_scale)),
+                                  exit_places(turns_of(q.y[1]), Four(tables.azimuth_scale))};
+    const ExitPlaces along = exit_places(turns_of(q.theta_r), Four(tables.longitude_scale));
+    AxisPlace offset[4], inclination[4];
+    tables.offset.places(q.offset, offset), tables.inclination.places(q.inclination, inclination);
+    float place[4];
+    store_four(q.sigma, place);
+    Four N[2][4], M[4];
+    for (int k = 0; k < 4; ++k) {
+        const AzimuthalPoint a = {tables.azimuthal_rows(offset[k]),
+                                  tables.offset.weights[offset[k].span].at(offset[k].along),
+                                  tables.sigma_weights.at(Same(place[k]))};
+        const LongitudinalPoint m = {tables.longitudinal_rows(inclination[k]),
+                                     tables.inclination.weights[inclination[k].span].at(inclination[k].along)};
+        for (int p = 0; p < 2; ++p) N[p][k] = tables.azimuthal_terms(a, tables.azimuth_exit(around[p], k));
+        M[k] = tables.longitudinal_terms(m, tables.longitude_exit(along, k));
+    }
+    return detail::four_densities(N, M, q.phi);
 }
 
 }  // namespace medulla

@@ -21,10 +21,11 @@ MEDULLA_HOT Four turns_of(Four y) noexcept {
     return t - nearest_integer(t);
 }
 
-/// spline_coordinate of an offset, or of an inclination over pi/2; x in [0, 1] but for rounding.
-MEDULLA_HOT Same chord_coordinate(Same x) noexcept {
-    const Same one(1.0f);
-    return x / (one + square_root(greater(one - x, Same(0.0f)) * (one + x)));
+/// spline_coordinate of an offset, or of an inclination over pi/2; x in [0, 1] but for rounding. T is Same or Four.
+template <class T>
+MEDULLA_HOT T chord_coordinate(T x) noexcept {
+    const T one(1.0f);
+    return x / (one + square_root(greater(one - x, T(0.0f)) * (one + x)));
 }
 
 /// Four neighbouring rows of an axis and their weights.
@@ -128,6 +129,17 @@ struct CubicAxis {
     MEDULLA_HOT RowPoint at(Same x) const noexcept {
         const AxisPlace p = place(x);
         return {first[p.span], weights[p.span].at(p.along)};
+    }
+    /// The spans of four coordinates.
+    MEDULLA_HOT void places(Four x, AxisPlace (&place)[4]) const noexcept {
+        const Four u = lesser(x * Four(scale), Four(end));
+        std::int32_t stretch[4];
+        float along[4];
+        store_whole(u, stretch), store_four(u, along);
+        for (int k = 0; k < 4; ++k) {
+            const std::uint32_t i = start[std::uint32_t(stretch[k])];
+            place[k] = {i, Same(along[k]) - Same(middle[i])};
+        }
     }
     /// The same of a spline. @param u a place [stretches] on the axis, in stretch `stretch`
     MEDULLA_HOT RowPoint at(std::int32_t stretch, float u) const noexcept {
@@ -240,11 +252,13 @@ struct UnfoldedTables {
         azimuth_scale = 2 * azimuth.end, longitude_scale = 4 * longitude.end;
         return true;
     }
-    MEDULLA_HOT Same sigma_place(float sigma) const noexcept {
-        const Same t = (square_root(Same(sigma)) - Same(middle_root)) * Same(inverse_range);
-        return lesser(greater(t, Same(-0.5f)), Same(0.5f));
+    /// @param sigma one optical radius or several abreast
+    template <class T>
+    MEDULLA_HOT T sigma_place(T sigma) const noexcept {
+        const T t = (square_root(sigma) - T(middle_root)) * T(inverse_range);
+        return lesser(greater(t, T(-0.5f)), T(0.5f));
     }
-    MEDULLA_HOT Four sigma_at(float sigma) const noexcept { return sigma_weights.at(sigma_place(sigma)); }
+    MEDULLA_HOT Four sigma_at(float sigma) const noexcept { return sigma_weights.at(sigma_place(Same(sigma))); }
     /// @param sigma what sigma_at gave  @param h offset [medulla radii], in [0, 1]
     MEDULLA_HOT AzimuthalPoint azimuthal_at(Four sigma, float h) const noexcept {
         const RowPoint row = offset.at(chord_coordinate(Same(h)));
@@ -257,6 +271,13 @@ struct UnfoldedTables {
         return sum_of(sigma * ((spread<0>(row.weight) * four_at(r) + spread<1>(row.weight) * four_at(r + 4)) +
                                (spread<2>(row.weight) * four_at(r + 8) + spread<3>(row.weight) * four_at(r + 12))));
     }
+    /// The rows of a span of h, and of theta_i.
+    MEDULLA_HOT const float* azimuthal_rows(const AxisPlace& at) const noexcept {
+        return azimuthal + std::size_t(offset.first[at.span]) * 8 * azimuth_rows;
+    }
+    MEDULLA_HOT const float* longitudinal_rows(const AxisPlace& at) const noexcept {
+        return longitudinal + std::size_t(inclination.first[at.span]) * 4 * longitude_rows;
+    }
     /// Where exit i lies among an azimuthal point's rows.
     MEDULLA_HOT RowPoint azimuth_exit(const ExitPlaces& p, int i) const noexcept {
         const RowPoint exit = azimuth.at(p.stretch[i], p.place[i]);
@@ -267,8 +288,8 @@ struct UnfoldedTables {
         const RowPoint exit = longitude.at(p.stretch[i], p.place[i]);
         return {2 * (exit.first + longitude_rows * (p.below >> i & 1u)), exit.weight};
     }
-    /// Density per radian at an exit, >= 0.
-    MEDULLA_HOT float azimuthal_density(const AzimuthalPoint& p, const RowPoint& exit) const noexcept {
+    /// Four terms of the density at an exit.
+    MEDULLA_HOT Four azimuthal_terms(const AzimuthalPoint& p, const RowPoint& exit) const noexcept {
         const std::uint32_t step = 8 * azimuth_rows;
         const float *r0 = p.rows + exit.first, *r1 = r0 + step, *r2 = r1 + step, *r3 = r2 + step;
         // h first: its weights are known before the exit's.
@@ -278,7 +299,11 @@ struct UnfoldedTables {
         };
         const Four sum = (spread<0>(exit.weight) * blend(0) + spread<1>(exit.weight) * blend(4)) +
                          (spread<2>(exit.weight) * blend(8) + spread<3>(exit.weight) * blend(12));
-        const float value = sum_of(sum * p.sigma);
+        return sum * p.sigma;
+    }
+    /// Density per radian at an exit, >= 0.
+    MEDULLA_HOT float azimuthal_density(const AzimuthalPoint& p, const RowPoint& exit) const noexcept {
+        const float value = sum_of(azimuthal_terms(p, exit));
         return 0.0f > value ? 0.0f : value;  // a NaN stays one
     }
     /// @param y [radians], |y| < 1e9
@@ -295,16 +320,19 @@ struct UnfoldedTables {
         const RowPoint row = inclination.at(chord_coordinate(Same(theta_i * float(2 / pi))));
         return {longitudinal + std::size_t(row.first) * 4 * longitude_rows, row.weight};
     }
-    /// Densities per radian at an exit, >= 0.
-    MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, const RowPoint& exit) const noexcept {
+    /// Terms of the densities at an exit: back and forward, twice.
+    MEDULLA_HOT Four longitudinal_terms(const LongitudinalPoint& p, const RowPoint& exit) const noexcept {
         const std::uint32_t step = 4 * longitude_rows;
         const float *r0 = p.rows + exit.first, *r1 = r0 + step, *r2 = r1 + step, *r3 = r2 + step;
         const auto blend = [&](int k) {
             return (spread<0>(p.weight) * four_at(r0 + k) + spread<1>(p.weight) * four_at(r1 + k)) +
                    (spread<2>(p.weight) * four_at(r2 + k) + spread<3>(p.weight) * four_at(r3 + k));
         };
-        const Four sum = lower_twice(exit.weight) * blend(0) + upper_twice(exit.weight) * blend(4);
-        return both_of(sum);
+        return lower_twice(exit.weight) * blend(0) + upper_twice(exit.weight) * blend(4);
+    }
+    /// Densities per radian at an exit, >= 0.
+    MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, const RowPoint& exit) const noexcept {
+        return both_of(longitudinal_terms(p, exit));
     }
     /// @param y [radians], in [-pi/2, pi/2]
     MEDULLA_HOT BackForward longitudinal_density(const LongitudinalPoint& p, float y) const noexcept {

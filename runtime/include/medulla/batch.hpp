@@ -1,9 +1,9 @@
 // Many exits of one prepared (theta_i, h) at once: what is left of the tables there is multiplied out, and exits go
-// four abreast. Rests on fur_fibre.hpp; NearField::eval is the slow twin.
+// four abreast. Rests on near_field.hpp; NearField::eval is the slow twin.
 #pragma once
 
 #include "medulla/config.hpp"
-#include "medulla/fur_fibre.hpp"
+#include "medulla/near_field.hpp"
 
 namespace medulla {
 

@@ -1,13 +1,13 @@
 // The far field and everything between: lobes averaged over offsets h in [h1, h2] (Eqs. 22 and 26 of Yan et al. 2017).
-// Rests on fur_fibre.hpp; by quadrature that follows the narrow Gaussians instead of the paper's closed forms, which
+// Rests on near_field.hpp; by quadrature that follows the narrow Gaussians instead of the paper's closed forms, which
 // divide by powers of a and linearise at the rim: docs/bcsdf.md, 'Far field', has the derivation and the errors.
 #pragma once
 
 #include <cmath>
 
 #include "medulla/config.hpp"
-#include "medulla/fur_fibre.hpp"
 #include "medulla/gauss_legendre.hpp"
+#include "medulla/near_field.hpp"
 
 namespace medulla {
 

@@ -6,7 +6,7 @@
 
 #include "medulla/config.hpp"
 #include "medulla/far_field.hpp"
-#include "medulla/fur_fibre.hpp"
+#include "medulla/near_field.hpp"
 #include "medulla/sampling.hpp"
 
 namespace medulla {

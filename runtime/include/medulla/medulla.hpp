@@ -45,6 +45,7 @@
 #include "medulla/held_integral.hpp"
 #include "medulla/lanes.hpp"
 #include "medulla/lookup.hpp"
+#include "medulla/near_field.hpp"
 #include "medulla/pack.hpp"
 #include "medulla/phase.hpp"
 #include "medulla/queries.hpp"

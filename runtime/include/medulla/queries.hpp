@@ -1,9 +1,9 @@
 // Many queries, each with its own light, offset and exit, four abreast: for wavefronts, where no two rays have anything
-// in common. Rests on fur_fibre.hpp, with its formulas; eval of one query is the slow twin.
+// in common. Rests on near_field.hpp, with its formulas; eval of one query is the slow twin.
 #pragma once
 
 #include "medulla/config.hpp"
-#include "medulla/fur_fibre.hpp"
+#include "medulla/near_field.hpp"
 
 namespace medulla {
 

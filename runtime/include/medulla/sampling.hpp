@@ -12,7 +12,7 @@
 #include "medulla/config.hpp"
 #include "medulla/exit_distribution.hpp"
 #include "medulla/far_field.hpp"
-#include "medulla/fur_fibre.hpp"
+#include "medulla/near_field.hpp"
 
 namespace medulla {
 

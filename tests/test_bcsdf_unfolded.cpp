@@ -263,12 +263,14 @@ TEST_CASE("a batch of queries is its queries one by one", "[bcsdf]") {
                     near_field(fibre, theta_i[i], h[i], near);
                     phi[i] = near.centre[i / 5 % 3];
                 }
-                if (i / 4 == 5) h[i] = i % 4 == 1 ? 1.5f : std::nanf("");
-                if (i / 4 == 6) theta_i[i] = i % 4 == 1 ? 1.6f : std::nanf("");
-                if (i / 4 == 7) theta_r[i] = i % 4 == 1 ? -1.6f : std::nanf("");
-                if (i / 4 == 8) phi[i] = i % 4 == 1 ? 1e5f : std::nanf("");
-                if (i / 4 == 9) theta_i[i] = i % 2 ? 1.5707963f : -1.57079637f;  // the second is the axis itself
-                if (i / 4 == 10) h[i] = i % 2 ? 1.0f : -1.0f;
+                // Out of range, one of each four, at each place in it.
+                if (i / 16 == 1) h[i] = i % 5 == 1 ? (i % 2 ? 1.5f : std::nanf("")) : h[i];
+                if (i / 16 == 2) theta_i[i] = i % 5 == 1 ? (i % 2 ? 1.6f : std::nanf("")) : theta_i[i];
+                if (i / 16 == 3) theta_r[i] = i % 5 == 1 ? (i % 2 ? -1.6f : std::nanf("")) : theta_r[i];
+                if (i / 16 == 4) phi[i] = i % 5 == 1 ? (i % 2 ? 1e5f : std::nanf("")) : phi[i];
+                if (i / 16 == 5 && i % 5 == 1) theta_i[i] = -1.57079637f;  // the axis itself
+                if (i / 4 == 24) theta_i[i] = 1.5707963f;                  // the last that is not
+                if (i / 4 == 25) h[i] = i % 2 ? 1.0f : -1.0f;
             }
             Colour<3> S[count + 1];
             S[count].value[0] = 42;
@@ -277,21 +279,20 @@ TEST_CASE("a batch of queries is its queries one by one", "[bcsdf]") {
             double error = 0, norm = 0;
             for (int i = 0; i < count; ++i) {
                 const Colour<3> one = eval(fibre, theta_i[i], theta_r[i], phi[i], h[i]);
-                const double cosine = std::cos(double(theta_i[i]));
+                const double cosine = std::abs(theta_i[i]) < 1.58f ? std::cos(double(theta_i[i])) : 0;
                 // Pointwise as test_bcsdf_near.cpp has it for a float and a double: what an angle's rounding moves.
                 const double tolerance = 4e-5 + 1.6e-5 / double(std::min(p.beta_m / 2, p.beta_n));
                 for (int c = 0; c < 3; ++c) {
                     const double a = double(S[i].value[c]), b = double(one.value[c]);
                     CHECK(a == Approx(b).epsilon(tolerance).margin(1e-12));
-                    if (i / 4 >= 5 && i / 4 < 9) CHECK(a == 0);
-                    if (i / 4 == 9) CHECK((a > 0) == (b > 0 && i % 2 == 1));
-                    if (i / 4 == 9 || a == 0) continue;  // 1 / cos^2 there is all that a norm would see
+                    CHECK((a == 0) == (b == 0));
+                    if (i / 16 >= 1 && i / 16 < 6 && i % 5 == 1) CHECK(a == 0);
                     error += std::pow((a - b) * cosine * cosine, 2), norm += std::pow(b * cosine * cosine, 2);
                 }
             }
-            // Twenty roundings of 6e-8, and an angle's 2e-7 over the narrowest lobe's 0.02.
+            // Twenty roundings of 6e-8, and an angle's 5e-7 over the narrowest lobe, 0.023, at one deviation.
             INFO(preset.name << " " << how);
-            CHECK(std::sqrt(error / norm) < 3e-6);
+            CHECK(std::sqrt(error / norm) < 1.2e-6 + 5e-7 / double(std::min(p.beta_m / 2, p.beta_n)));
             largest = std::max(largest, std::sqrt(error / norm));
         }
     std::printf("batches of queries: relative L2 of %.1e against one by one\n", largest);

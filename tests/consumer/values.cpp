@@ -1,6 +1,7 @@
 // Numbers from every door of the BCSDF, one per line: what each compiler and target must print alike.
 #include <cstdio>
 #include <initializer_list>
+#include <limits>
 
 #include "medulla/medulla.hpp"
 
@@ -34,11 +35,14 @@ int main() {
                 for (int c = 0; c < 2; ++c) print(m.value[c]), print(g.value[c]);
                 print(near_sampler.pdf(0.1f - theta_i, phi)), print(far_sampler.pdf(0.1f - theta_i, phi));
             }
-            const float theta_is[5] = {theta_i, -theta_i, 0.9f, theta_i, 1.5f},
-                        hs[5] = {0.4f, -0.7f, 0.99f, 0.0f, 2.0f}, theta_rs[5] = {0.1f - theta_i, 0.2f, -0.8f, 1.4f, 0},
+            const float nan = std::numeric_limits<float>::quiet_NaN();
+            const float theta_is[5] = {theta_i, -theta_i, 1.57f, nan, 1.5f}, hs[5] = {0.4f, -0.7f, 0.99f, 0.0f, -0.2f},
+                        theta_rs[5] = {0.1f - theta_i, 0.2f, -1.5f, 1.4f, -1.4f},
                         phis[5] = {0.5f, -2.8f, 3.1f, 1.0f, 0};
             Colour<2> S[5];
             eval(unfolded, 5, theta_is, hs, theta_rs, phis, S);
+            for (const Colour<2>& at : S) print(at.value[0]), print(at.value[1]);
+            eval(fibre, 5, theta_is, hs, theta_rs, phis, S);
             for (const Colour<2>& at : S) print(at.value[0]), print(at.value[1]);
             const RandomNumbers u = {0.6f, 0.3f, 0.7f, 0.2f, 0.5f};
             const FurSample<2> a = near_sampler.sample(u), b = far_sampler.sample(u);

@@ -231,7 +231,7 @@ MEDULLA_FN T sample(const WrappedGaussian<T>& gaussian, T u, T v, T most = T(1e3
     return wrap_angle(gaussian.deviation * (magnitude(z) <= most ? z : radius * std::sin(T(2 * pi) * v)));
 }
 
-/// The truncated Gaussians of R, TT and TRT abreast; lane 3 is nobody's.
+/// Truncated Gaussians abreast: those of R, TT and TRT (lane 3 is nobody's), or of one lobe of four queries.
 struct TruncatedGaussians {
     Four origin, deviation, inverse, beyond, peak;  ///< as TruncatedGaussian has them
 

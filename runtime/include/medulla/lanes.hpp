@@ -27,13 +27,13 @@ namespace medulla {
 
 namespace detail {
 
-/// |x| <= limit, false for a NaN also under -ffast-math: compared as bits, limit > 0.
-MEDULLA_FN bool within(float x, float limit) noexcept {
-    std::uint32_t bits, limit_bits;
+MEDULLA_FN std::uint32_t bits_of(float x) noexcept {
+    std::uint32_t bits;
     std::memcpy(&bits, &x, sizeof bits);
-    std::memcpy(&limit_bits, &limit, sizeof limit_bits);
-    return (bits & 0x7fffffffu) <= limit_bits;
+    return bits;
 }
+/// |x| <= limit, false for a NaN also under -ffast-math: compared as bits, limit > 0.
+MEDULLA_FN bool within(float x, float limit) noexcept { return (bits_of(x) & 0x7fffffffu) <= bits_of(limit); }
 
 }  // namespace detail
 
@@ -57,12 +57,14 @@ struct FourMask {
 inline FourMask operator<(Four a, Four b) noexcept { return {_mm_cmplt_ps(a.v, b.v)}; }
 inline FourMask operator>(Four a, Four b) noexcept { return {_mm_cmpgt_ps(a.v, b.v)}; }
 inline FourMask operator&(FourMask a, FourMask b) noexcept { return {_mm_and_ps(a.v, b.v)}; }
-/// detail::within, lane by lane.
+namespace detail {
+/// The same, lane by lane.
 inline FourMask within(Four a, float limit) noexcept {
     const __m128i bits = _mm_and_si128(_mm_castps_si128(a.v), _mm_set1_epi32(0x7fffffff));
     const __m128i end = _mm_add_epi32(_mm_castps_si128(_mm_set1_ps(limit)), _mm_set1_epi32(1));
     return {_mm_castsi128_ps(_mm_cmplt_epi32(bits, end))};
 }
+}  // namespace detail
 inline Four choose(FourMask mask, Four yes, Four no) noexcept {
     return Four(_mm_or_ps(_mm_and_ps(mask.v, yes.v), _mm_andnot_ps(mask.v, no.v)));
 }
@@ -153,10 +155,11 @@ MEDULLA_FN FourMask operator<(Four a, Four b) noexcept {
     return {{a.v[0] < b.v[0], a.v[1] < b.v[1], a.v[2] < b.v[2], a.v[3] < b.v[3]}};
 }
 MEDULLA_FN FourMask operator>(Four a, Four b) noexcept { return b < a; }
+namespace detail {
 MEDULLA_FN FourMask within(Four a, float limit) noexcept {
-    return {{detail::within(a.v[0], limit), detail::within(a.v[1], limit), detail::within(a.v[2], limit),
-             detail::within(a.v[3], limit)}};
+    return {{within(a.v[0], limit), within(a.v[1], limit), within(a.v[2], limit), within(a.v[3], limit)}};
 }
+}  // namespace detail
 MEDULLA_FN FourMask operator&(FourMask a, FourMask b) noexcept {
     return {{a.v[0] && b.v[0], a.v[1] && b.v[1], a.v[2] && b.v[2], a.v[3] && b.v[3]}};
 }

@@ -32,9 +32,10 @@ struct FourQueries {
 
 /// What the medulla's absorption leaves of scattered light, where the tables know it.
 template <int Channels>
-MEDULLA_FN Four survival_at(const FurFibre<Channels>& fibre, Four inverse_cos_t, Four sigma, Four offset) noexcept {
+MEDULLA_FN Four survival_abreast(const FurFibre<Channels>& fibre, Four inverse_cos_t, Four sigma_place,
+                                 Four offset) noexcept {
     float place[4], h[4], absorbed[4], left[4];
-    store_four(sigma, place), store_four(offset, h);
+    store_four(sigma_place, place), store_four(offset, h);
     store_four(Four(fibre.parameters.sigma_ma * fibre.parameters.kappa) * inverse_cos_t, absorbed);
     for (int k = 0; k < 4; ++k) {
         const Four weights = fibre.tables->sigma_weights.at(Same(place[k]));
@@ -62,7 +63,7 @@ MEDULLA_FN void add_scattered(const FurFibre<Channels>& fibre, const FourQueries
     at.y[0] = turned(1), at.y[1] = turned(2);
     at.theta_r = choose(q.theta_i < zero, -q.theta_r, q.theta_r), at.phi = q.phi;
     const FourDensities density = scattered_densities(tables, at);
-    const Four left = fibre.survival ? survival_at(fibre, inverse_cos_t, at.sigma, offset) : Four(1.0f);
+    const Four left = fibre.survival ? survival_abreast(fibre, inverse_cos_t, at.sigma, offset) : Four(1.0f);
     Four most(0.0f);
     for (int c = 0; c < Channels; ++c) most = greater((energy.A[3][c] + energy.A[4][c]) * left, most);
     const Four M = only_where(most > Four(negligible_energy), density.M * left);
@@ -97,10 +98,10 @@ template <int Channels>
 MEDULLA_FN void eval_singly(const FurFibre<Channels>& fibre, int count, const float* theta_i, const float* h,
                             const float* theta_r, const float* phi, Colour<Channels>* S) noexcept {
     NearField<Channels> near;
-    for (int i = 0; i < count; ++i) {
-        if (i == 0 || !(theta_i[i] == theta_i[i - 1]))
+    for (int i = 0; i < count; ++i) {  // as bits, so that a NaN is no neighbour's value under -ffast-math either
+        if (i == 0 || bits_of(theta_i[i]) != bits_of(theta_i[i - 1]))
             near_field(fibre, theta_i[i], h[i], near);
-        else if (!(h[i] == h[i - 1]))
+        else if (bits_of(h[i]) != bits_of(h[i - 1]))
             set_offset(near, h[i]);
         S[i] = near.eval(theta_r[i], phi[i]);
     }
@@ -109,8 +110,12 @@ MEDULLA_FN void eval_singly(const FurFibre<Channels>& fibre, int count, const fl
 template <int Channels>
 MEDULLA_FN void eval_abreast(const FurFibre<Channels>& fibre, int count, const float* theta_i, const float* h,
                              const float* theta_r, const float* phi, Colour<Channels>* S) noexcept {
-    for (int from = 0; from < count; from += 4) {
-        const int n = count - from < 4 ? count - from : 4;
+    for (int from = 0, n; from < count; from += n) {
+        n = count - from < 4 ? count - from : 4;
+        if (n == 1) {
+            S[from] = eval(fibre, theta_i[from], theta_r[from], phi[from], h[from]);
+            continue;
+        }
         float last[4][4] = {};  // fewer than four: the rest stands at 0
         for (int i = 0; n < 4 && i < n; ++i)
             last[0][i] = theta_i[from + i], last[1][i] = h[from + i], last[2][i] = theta_r[from + i],
@@ -130,7 +135,8 @@ MEDULLA_FN void eval_abreast(const FurFibre<Channels>& fibre, int count, const f
 }  // namespace detail
 
 /// S of Eq. 12 of `count` queries, each with its own light, offset and exit, as eval(fibre, theta_i[i], theta_r[i],
-/// phi[i], h[i]) but for rounding. Four abreast, unless the fibre scatters and reads factors.
+/// phi[i], h[i]) but for rounding. Four abreast, unless the fibre scatters and reads factors. S overlaps none of the
+/// others.
 template <int Channels>
 MEDULLA_FN void eval(const FurFibre<Channels>& fibre, int count, const float* theta_i, const float* h,
                      const float* theta_r, const float* phi, Colour<Channels>* S) noexcept {

@@ -64,8 +64,7 @@ MEDULLA_FN SineCosine<T> sine_cosine_about_0(T y) noexcept {
                 z * z * (T(4.166664568298827e-2f) + z * (T(-1.388731625493765e-3f) + z * T(2.443315711809948e-5f)))};
 }
 
-/// Sine and cosine in [-pi/2, pi/2] from the half angle; (c - s)(c + s) keeps the cosine's digits near pi/2, to 6e-8 of
-/// 1.
+/// Sine and cosine in [-pi/2, pi/2] from the half angle, the cosine as (c - s)(c + s): to 6e-8 of 1.
 template <class T>
 MEDULLA_FN SineCosine<T> sine_cosine(T x) noexcept {
     const auto [s, c] = sine_cosine_about_0(T(0.5f) * x);
@@ -73,12 +72,14 @@ MEDULLA_FN SineCosine<T> sine_cosine(T x) noexcept {
 }
 
 /// Cosine in [-pi/2, pi/2] to 2e-7 of itself, however small: beyond pi/4 it is the sine of what is missing to pi/2,
-/// which is float(pi/2) less x, exactly, and the 4.4e-8 that float(pi/2) is too much.
+/// which is float(pi/2) less x, exactly, and the 4.4e-8 that float(pi/2) is too much. The magnitude of the former,
+/// which is not negative, changes nothing; it keeps -ffast-math from joining both constants, which would lose the
+/// latter.
 template <class T>
 MEDULLA_FN T cosine(T x) noexcept {
     const T a = magnitude(x);
     const auto steep = a > T(0.78539816f);
-    const auto [s, c] = sine_cosine_about_0(choose(steep, (T(1.57079637f) - a) - T(4.37113883e-8f), a));
+    const auto [s, c] = sine_cosine_about_0(choose(steep, magnitude(T(1.57079637f) - a) - T(4.37113883e-8f), a));
     return choose(steep, s, c);
 }
 

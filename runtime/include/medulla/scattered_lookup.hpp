@@ -15,9 +15,13 @@ struct ScatteredDensities {
     float M = 0, D[2] = {};  ///< longitudinal and azimuthal [1 / radian]
 };
 
-/// M^s of Eq. 19, from its two sides at |phi| / pi.
+/// M^s of Eq. 19, from its two sides at |phi| / pi, one or several abreast.
+template <class T>
+MEDULLA_HOT T blend_sides(T back, T forward, T forwardness) noexcept {
+    return (T(1.0f) - forwardness) * back + forwardness * forward;
+}
 MEDULLA_HOT float blend_sides(BackForward side, float forwardness) noexcept {
-    return (1 - forwardness) * side.back + forwardness * side.forward;
+    return blend_sides(side.back, side.forward, forwardness);
 }
 
 /// Four queries, each with its own near field and exit.
@@ -33,7 +37,7 @@ struct FourDensities {
 
 namespace detail {
 
-/// @param N lanes to be added up  @param M back and forward, twice, to be added up
+/// @param N lanes to be added up  @param M back and forward, twice, to be added up; both are left transposed
 MEDULLA_HOT FourDensities four_densities(Four (&N)[2][4], Four (&M)[4], Four phi) noexcept {
     const Four zero(0.0f), forwardness = Four(2.0f) * magnitude(turns_of(phi));
     FourDensities at;
@@ -42,7 +46,7 @@ MEDULLA_HOT FourDensities four_densities(Four (&N)[2][4], Four (&M)[4], Four phi
         at.D[p] = greater(zero, (N[p][0] + N[p][1]) + (N[p][2] + N[p][3]));  // a NaN stays one
     }
     transpose(M[0], M[1], M[2], M[3]);
-    at.M = (Four(1.0f) - forwardness) * greater(zero, M[0] + M[2]) + forwardness * greater(zero, M[1] + M[3]);
+    at.M = blend_sides(greater(zero, M[0] + M[2]), greater(zero, M[1] + M[3]), forwardness);
     return at;
 }
 
@@ -130,7 +134,7 @@ MEDULLA_WIDE inline TwoDensities wide_lookup(const UnfoldedTables& tables, const
                                           _mm_set1_epi32(std::int32_t(tables.azimuth_rows)));
     const WideRows offset = wide_rows(wide_weights(tables.offset.weights[at.span], at.along));
     const __m256 twice = _mm256_set_m128(sigma, sigma);
-    const float* rows = tables.azimuthal + std::size_t(at.span) * 8 * tables.azimuth_rows;
+    const float* rows = tables.azimuthal_rows(at.span);  // of a spline
     const __m128 N = held_sums(wide_azimuthal(tables, rows, offset, twice, places, 0),
                                wide_azimuthal(tables, rows, offset, twice, places, 1));
     return {_mm_cvtss_f32(N), _mm_cvtss_f32(_mm_shuffle_ps(N, N, 1))};
@@ -177,10 +181,10 @@ MEDULLA_WIDE inline FourDensities wide_exits(const UnfoldedTables& tables, const
         const WideRows h = wide_rows(wide_weights(tables.offset.weights[offset[k].span], offset[k].along));
         const __m128 sigma = wide_weights(tables.sigma_weights, Same(place[k]));
         const __m256 twice = _mm256_set_m128(sigma, sigma);
-        const float* rows = tables.azimuthal_rows(offset[k]);
+        const float* rows = tables.azimuthal_rows(offset[k].span);  // of a spline
         for (int p = 0; p < 2; ++p) N[p][k] = Four(wide_azimuthal(tables, rows, h, twice, around[p], k));
         M[k] = Four(wide_longitudinal(
-            tables, tables.longitudinal_rows(inclination[k]),
+            tables, tables.longitudinal_rows(tables.inclination.first[inclination[k].span]),
             wide_weights(tables.inclination.weights[inclination[k].span], inclination[k].along), along, k));
     }
     return four_densities(N, M, q.phi);
@@ -239,10 +243,10 @@ MEDULLA_HOT FourDensities scattered_densities(const UnfoldedTables& tables, cons
     store_four(q.sigma, place);
     Four N[2][4], M[4];
     for (int k = 0; k < 4; ++k) {
-        const AzimuthalPoint a = {tables.azimuthal_rows(offset[k]),
+        const AzimuthalPoint a = {tables.azimuthal_rows(offset[k].span),
                                   tables.offset.weights[offset[k].span].at(offset[k].along),
                                   tables.sigma_weights.at(Same(place[k]))};
-        const LongitudinalPoint m = {tables.longitudinal_rows(inclination[k]),
+        const LongitudinalPoint m = {tables.longitudinal_rows(tables.inclination.first[inclination[k].span]),
                                      tables.inclination.weights[inclination[k].span].at(inclination[k].along)};
         for (int p = 0; p < 2; ++p) N[p][k] = tables.azimuthal_terms(a, tables.azimuth_exit(around[p], k));
         M[k] = tables.longitudinal_terms(m, tables.longitude_exit(along, k));

@@ -123,8 +123,7 @@ struct CubicAxis {
     /// The span of a spline coordinate >= 0; beyond the axis, as for a NaN, its end holds.
     MEDULLA_HOT AxisPlace place(Same x) const noexcept {
         const Same u = lesser(x * Same(scale), Same(end));
-        const std::uint32_t i = start[std::uint32_t(whole(u))];
-        return {i, u - Same(middle[i])};
+        return place_in(whole(u), u);
     }
     MEDULLA_HOT RowPoint at(Same x) const noexcept {
         const AxisPlace p = place(x);
@@ -136,15 +135,12 @@ struct CubicAxis {
         std::int32_t stretch[4];
         float along[4];
         store_whole(u, stretch), store_four(u, along);
-        for (int k = 0; k < 4; ++k) {
-            const std::uint32_t i = start[std::uint32_t(stretch[k])];
-            place[k] = {i, Same(along[k]) - Same(middle[i])};
-        }
+        for (int k = 0; k < 4; ++k) place[k] = place_in(stretch[k], Same(along[k]));
     }
     /// The same of a spline. @param u a place [stretches] on the axis, in stretch `stretch`
     MEDULLA_HOT RowPoint at(std::int32_t stretch, float u) const noexcept {
-        const std::uint32_t i = start[std::uint32_t(stretch)];
-        return {i, weights[i].at(Same(u) - Same(middle[i]))};
+        const AxisPlace p = place_in(stretch, Same(u));
+        return {p.span, weights[p.span].at(p.along)};
     }
 
     /// Integral over a spline's axis of what each row is weighted by [the axis's unit].
@@ -161,6 +157,10 @@ struct CubicAxis {
     }
 
   private:
+    MEDULLA_HOT AxisPlace place_in(std::int32_t stretch, Same u) const noexcept {
+        const std::uint32_t i = start[std::uint32_t(stretch)];
+        return {i, u - Same(middle[i])};
+    }
     template <class Breakpoint, class F>
     MEDULLA_FN bool set(std::uint32_t count, Breakpoint&& breakpoint, F&& weights_of) noexcept {
         spans = count;
@@ -262,7 +262,7 @@ struct UnfoldedTables {
     /// @param sigma what sigma_at gave  @param h offset [medulla radii], in [0, 1]
     MEDULLA_HOT AzimuthalPoint azimuthal_at(Four sigma, float h) const noexcept {
         const RowPoint row = offset.at(chord_coordinate(Same(h)));
-        return {azimuthal + std::size_t(row.first) * 8 * azimuth_rows, row.weight, sigma};
+        return {azimuthal_rows(row.first), row.weight, sigma};
     }
     /// What -log(survival) is per absorption.  @param sigma, h as above
     MEDULLA_HOT float survival_length(Four sigma, float h) const noexcept {
@@ -271,12 +271,12 @@ struct UnfoldedTables {
         return sum_of(sigma * ((spread<0>(row.weight) * four_at(r) + spread<1>(row.weight) * four_at(r + 4)) +
                                (spread<2>(row.weight) * four_at(r + 8) + spread<3>(row.weight) * four_at(r + 12))));
     }
-    /// The rows of a span of h, and of theta_i.
-    MEDULLA_HOT const float* azimuthal_rows(const AxisPlace& at) const noexcept {
-        return azimuthal + std::size_t(offset.first[at.span]) * 8 * azimuth_rows;
+    /// From a row of h, and of theta_i.
+    MEDULLA_HOT const float* azimuthal_rows(std::uint32_t first) const noexcept {
+        return azimuthal + std::size_t(first) * 8 * azimuth_rows;
     }
-    MEDULLA_HOT const float* longitudinal_rows(const AxisPlace& at) const noexcept {
-        return longitudinal + std::size_t(inclination.first[at.span]) * 4 * longitude_rows;
+    MEDULLA_HOT const float* longitudinal_rows(std::uint32_t first) const noexcept {
+        return longitudinal + std::size_t(first) * 4 * longitude_rows;
     }
     /// Where exit i lies among an azimuthal point's rows.
     MEDULLA_HOT RowPoint azimuth_exit(const ExitPlaces& p, int i) const noexcept {
@@ -318,7 +318,7 @@ struct UnfoldedTables {
     /// @param theta_i [radians], in [0, pi/2]
     MEDULLA_HOT LongitudinalPoint longitudinal_at(float theta_i) const noexcept {
         const RowPoint row = inclination.at(chord_coordinate(Same(theta_i * float(2 / pi))));
-        return {longitudinal + std::size_t(row.first) * 4 * longitude_rows, row.weight};
+        return {longitudinal_rows(row.first), row.weight};
     }
     /// Terms of the densities at an exit: back and forward, twice.
     MEDULLA_HOT Four longitudinal_terms(const LongitudinalPoint& p, const RowPoint& exit) const noexcept {

@@ -1,5 +1,5 @@
 // furtable bcsdf and furtable presets: the fur model by hand, lobe by lobe.
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include "medulla/medulla.hpp"
 #include "tables/commands.hpp"
@@ -59,7 +59,7 @@ void warn_beyond_axes(const FurFibre<3>& fibre, const Longitudinal<3>& at, doubl
 void run_bcsdf(const BcsdfWords& words) {
     for (const auto& [name, degrees] : {std::pair("--theta-i", words.theta_i), std::pair("--theta-r", words.theta_r)})
         if (!(degrees >= -90 && degrees <= 90))
-            throw UsageError("{}: expected degrees in [-90, 90], found {:g}", name, degrees);
+            throw UsageError("{}: expected degrees in [-90, 90], found {}", name, degrees);
     if (!std::isfinite(words.phi)) throw UsageError("--phi: expected degrees, found {:g}", words.phi);
     const double phi = std::remainder(words.phi, 360.0);
     const OffsetRange range = range_of(words);
@@ -84,7 +84,7 @@ void run_bcsdf(const BcsdfWords& words) {
     far_field(fibre, static_cast<float>(theta_i), range, field);
     if (!field.valid)
         throw UsageError(
-            "--theta-i: expected degrees within (-90, 90), since light along the fibre meets no section, found {:g}",
+            "--theta-i: expected degrees within (-90, 90), since light along the fibre meets no section, found {}",
             words.theta_i);
     warn_beyond_axes(fibre, field.near.longitudinal,
                      static_cast<double>(std::max(std::abs(range.low), std::abs(range.high))),
@@ -113,7 +113,7 @@ void run_bcsdf(const BcsdfWords& words) {
     if (words.json)
         fmt::print("{}\n", json.dump());
     else
-        fmt::print("sum   {}\n", json["sum"].dump());
+        fmt::print("sum   {:.6g}\n", fmt::join(sum, sum + (material.grey ? 1 : 3), "  "));
 }
 
 struct PresetWords {

@@ -152,7 +152,7 @@ MEDULLA_FN float medulla_angle(const FarField<Channels>& far, float gamma) noexc
 /// (docs/bcsdf.md). A long piece sees the amplitude fall to 0 at the fibre's rim, or rise to a dense medulla's.
 MEDULLA_FN int rule_for(float deviations, float length) noexcept {
     const int amplitude = length < 1.2f ? 0 : (length < 2.4f ? 1 : 2);
-    const int gaussian = deviations < 6 ? 0 : (deviations < 10 ? 1 : (deviations < 14 ? 2 : 3));
+    const int gaussian = deviations < 5.5f ? 0 : (deviations < 9 ? 1 : (deviations < 12.4f ? 2 : 3));
     return amplitude > gaussian ? amplitude : gaussian;
 }
 
@@ -427,7 +427,7 @@ MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, floa
     }
 }
 
-/// What is kept of an average: its quadrature gives at most 1e-5 more than the model has (docs/bcsdf.md, 'Right at the
+/// What is kept of an average: its quadrature gives up to 4.5e-6 more than the model has (docs/bcsdf.md, 'Right at the
 /// ends'), and white fur must not shine.
 inline constexpr float kept_of_average = 1 - 1e-5f;
 

@@ -69,6 +69,19 @@ MEDULLA_FN Colour<Channels> eval(const FurFibre<Channels>& fibre, Vector<float> 
     return eval(fibre, i.theta, r.theta, r.phi - i.phi, range);
 }
 
+/// Energy per steradian about omega_r of a unit of light along omega_i: S cos^2 theta_i / cos theta_r = sum M N / cos
+/// theta_r. Its integral over omega_r is the albedo; over a sampler's pdf it is a sample's weight. It is what
+/// multiplies the radiance of a light at omega_r where omega_i is the camera's ray (next-event estimation).
+/// @param where offset h, or a range of offsets
+template <int Channels, class Where>
+MEDULLA_FN Colour<Channels> density(const FurFibre<Channels>& fibre, Vector<float> omega_i, Vector<float> omega_r,
+                                    Where where) noexcept {
+    Colour<Channels> value = eval(fibre, omega_i, omega_r, where);
+    const float square = omega_i.y * omega_i.y + omega_i.z * omega_i.z, theta_r = angles_of(omega_r).theta;
+    for (float& v : value.value) v = detail::solid_angle_density(v * square, theta_r);
+    return value;
+}
+
 /// Density per steradian of omega_r. @param sampler a NearSampler or FarSampler prepared at omega_i's inclination
 template <class Sampler>
 MEDULLA_FN float pdf(const Sampler& sampler, Vector<float> omega_i, Vector<float> omega_r) noexcept {

@@ -156,7 +156,7 @@ MEDULLA_FN FurStatus prepare(const FurParameters<Channels>& p, const PackView& p
     return fibre.status;
 }
 
-/// Widest range of sqrt(sigma), upper over lower end, that four nodes are enough for: eta >= 1.165.
+/// Widest range of sqrt(sigma), upper over lower end, that four nodes are enough for: eta >= 1.163.
 inline constexpr float widest_root_range = 1.4f;
 
 /// How far from 1 a spline coefficient's integral over phi may be, for all of them to be divided by it: that moves a
@@ -167,10 +167,11 @@ inline constexpr double most_imbalance = 1e-2;
 /// the cubic between the pack's own breakpoints errs by more than 1e-5 (by 1e-4 to 5e-4).
 inline constexpr std::uint32_t halved_spans = 5;
 
-/// Multiplies the material's tables out into `tables`, which `fibre` then reads instead of the factors; takes about
-/// 1 ms with the default pack. false, and the fibre reads its factors, where they do not fit: longer or fewer than 3
-/// spans of an axis, longitudinal tables on different axes or not up to 90 degrees, a sigma axis that begins above the
-/// material's (or, where absorption goes with sigma, ends below it), eta so near 1 that sigma's range is wide.
+/// Multiplies the material's tables out into `tables`, which `fibre` then reads instead of the factors; takes half
+/// a millisecond with the default pack. false, and the fibre stays as it is, where it does not scatter, and where they
+/// do not fit: longer or fewer than 3 spans of an axis, longitudinal tables on different axes or not up to 90 degrees,
+/// a sigma axis that begins above the material's (or, where absorption goes with sigma, ends below it), eta so near 1
+/// that sigma's range is wide.
 template <int Channels>
 MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexcept {
     fibre.tables = nullptr;

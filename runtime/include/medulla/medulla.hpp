@@ -3,14 +3,20 @@
 //
 // Use.
 //   FurFibre<3> fibre;                              once per material
-//   prepare(parameters, open_pack(default_pack_words, default_pack_size).pack, fibre);
-//   UnfoldedTables tables; unfold(fibre, tables);   optional, 153 KB a material: near field 9 times as fast
+//   prepare(parameters_of<3>(*find_preset("bobcat")), open_pack(default_pack_words, default_pack_size).pack, fibre);
+//                                                   its FurStatus says what is wrong with parameters or pack
+//   UnfoldedTables tables; unfold(fibre, tables);   optional, 153 KB a material: near field 36 times as fast
 //   eval(fibre, theta_i, theta_r, phi, h)           near field: a ray at offset h
 //   eval(fibre, theta_i, theta_r, phi, range)       mean over offsets; OffsetRange{} is the far field
 //   eval(fibre, omega_i, omega_r, h or range)       the same from directions in the fibre's frame
+//   density(fibre, omega_i, omega_r, h or range)    energy per steradian, as the samplers' pdf is
 //   eval(near, count, theta_r, phi, S)              many exits of a NearField at once
-//   eval(fibre, count, theta_i, h, theta_r, phi, S) many queries at once
-//   NearField, FarField; NearSampler, FarSampler    the same, prepared for many exits; sample and pdf
+//   eval(fibre, count, theta_i, h, theta_r, phi, S) many queries at once (h comes second here)
+//   NearField<3> near; near_field(fibre, theta_i, h, near); near.eval(theta_r, phi)              prepared for many
+//   exits FarField<3> far; far_field(fibre, theta_i, range, far); far.eval(theta_r, phi) NearSampler<3> sampler;
+//   sampler.prepare(near);  FarSampler<3> from a FarField FurSample<3> s = sampler.sample(RandomNumbers); theta_r, phi,
+//   pdf, weight; sampler.pdf(theta_r, phi)
+// docs/bcsdf.md has every formula.
 //
 // Frame. The fibre runs along x, from tip to root; (y, z) is its cross-section. A direction has inclination theta =
 // asin x in [-pi/2, pi/2] and azimuth phi = atan2(z, y), both in radians. omega_i points from the fibre to the light,
@@ -18,16 +24,17 @@
 // towards +x. h in [-1, 1] is the offset of the incoming ray [fibre radii] along the left normal (counter-clockwise in
 // (y, z)) of its direction of travel -omega_i.
 //
-// i and r. 'i' is the direction that is known, with its h: the light's in light tracing; in path tracing, by
-// reciprocity, the camera ray's, and 'r' is what is drawn.
+// i and r. 'i' is the direction that is known, with its h: the light's in light tracing, the camera ray's in path
+// tracing; 'r' is what is drawn. The model is not reciprocal (docs/bcsdf.md, 'Value and measure'): keep to one of them.
 //
 // Value. S = sum over lobes of M N / cos^2 theta_i (Eq. 12 of Yan et al. 2017). The cosine is the caller's, as with a
-// BSDF: L_r = integral over solid angle of L_i S cos(theta_i), cos(theta_i) = sqrt(1 - x^2) of omega_i.
+// BSDF: with the light as i, L_r = integral of L_i S cos(theta_i) d omega_i, cos(theta_i) = sqrt(1 - x^2) of omega_i.
 //
-// Measure. d omega = cos theta d theta d phi, so the cosines cancel in (theta, phi): sum M N is energy per radian^2 of
-// (theta_r, phi), sum M N / cos theta_r energy per steradian. Every M integrates to 1 over theta_r, every N to its
-// lobe's energy A over phi. `pdf_angular` is per radian^2, `pdf` per steradian; a sample's `weight` is sum M N /
-// pdf_angular: it multiplies a path's throughput as it is, no cosine is left to add.
+// Measure. Every M integrates to 1 over theta_r, every N to its lobe's energy A over phi: sum M N is energy per
+// radian^2 of (theta_r, phi), and sum M N / cos theta_r energy per steradian: `density`. With the camera as i, radiance
+// is the integral of L_r density d omega_r; a light that is sampled gives L_r density / (its pdf per steradian).
+// `pdf_angular` is per radian^2, `pdf` per steradian; a sample's `weight` is density / pdf: it multiplies a path's
+// throughput as it is, no cosine is left to add.
 #pragma once
 
 #include "medulla/axis.hpp"

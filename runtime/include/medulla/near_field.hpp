@@ -36,8 +36,8 @@ MEDULLA_FN Colour<Channels> angular_density(const LobeValues<Channels>& lobes) n
     return sum;
 }
 
-/// Least cosine of an inclination that a float angle can mean: half a spacing of floats around pi/2, 2^-24.5. A
-/// direction nearer to the axis than that is the axis itself, where a fibre has no cross-section: lobes are 0 there.
+/// Below every cosine that a float angle within pi/2 has: the last, 1.57079625, has 7.5e-8, and the next lies 4.4e-8
+/// beyond pi/2. It is the axis itself, where a fibre has no cross-section: lobes are 0 there.
 inline constexpr float least_cosine = 4.3e-8f;
 
 /// The part that theta_i decides.

@@ -401,7 +401,7 @@ void bench_far(const PackView& pack) {
 
 /// Variance of the weight's first channel, by lobes drawn as we do and with scattered ones drawn evenly in phi and as
 /// cosine in theta (Sec. 6 of the paper).
-void bench_sampling(const FurFibre<3>& fibre) {
+void bench_sampling(const FurFibre<3>& fibre, const std::string& how) {
     std::mt19937_64 engine(3);
     const auto uniform = [&] { return float(engine() >> 40) * 0x1p-24f; };
     const auto q = queries(256);
@@ -436,26 +436,26 @@ void bench_sampling(const FurFibre<3>& fibre) {
         }
         ours += s2 / samples - std::pow(s1 / samples, 2), paper += t2 / samples - std::pow(t1 / samples, 2), ++count;
     }
-    report("sampling: variance of a weight, lobes from the tables", ours / double(count), "");
-    report("sampling: variance of a weight, scattered lobes evenly", paper / double(count), "");
-    report("sampling: largest weight seen", double(largest), "");
+    report("sampling: variance of a weight, lobes from the tables, " + how, ours / double(count), "");
+    report("sampling: variance of a weight, scattered lobes evenly, " + how, paper / double(count), "");
+    report("sampling: largest weight seen, " + how, double(largest), "");
     NearField<3> near;
     near_field(fibre, 0.3f, 0.4f, near);
     NearSampler<3> sampler;
-    report("sampling: preparing a near sampler",
+    report("sampling: preparing a near sampler, " + how,
            nanoseconds(4096,
                        [&] {
                            for (int i = 0; i < 4096; ++i) sampler.prepare(near), sink = sampler.shares.total;
                        }),
            "ns");
-    report("sampling: one near sample with its pdf and weight",
+    report("sampling: one near sample with its pdf and weight, " + how,
            nanoseconds(4096,
                        [&] {
                            for (int i = 0; i < 4096; ++i)
                                sink = sampler.sample({uniform(), uniform(), uniform(), uniform(), 0}).pdf;
                        }),
            "ns");
-    report("sampling: one near pdf",
+    report("sampling: one near pdf, " + how,
            nanoseconds(int(q.size()),
                        [&] {
                            for (const Query& x : q) sink = sampler.pdf(x.theta_r, x.phi);
@@ -464,13 +464,13 @@ void bench_sampling(const FurFibre<3>& fibre) {
     FarField<3> far;
     far_field(fibre, 0.3f, OffsetRange{}, far);
     FarSampler<3> far_sampler;
-    report("sampling: preparing a far sampler",
+    report("sampling: preparing a far sampler, " + how,
            nanoseconds(256,
                        [&] {
                            for (int i = 0; i < 256; ++i) far_sampler.prepare(far), sink = far_sampler.side_share;
                        }),
            "ns");
-    report("sampling: one far sample with its pdf and weight",
+    report("sampling: one far sample with its pdf and weight, " + how,
            nanoseconds(1024,
                        [&] {
                            for (int i = 0; i < 1024; ++i)
@@ -517,11 +517,13 @@ int main(int argc, char** argv) {
     bench_near(fibre, "factors");
     fibre.exact_energy = false;
     bench_near(fibre, "factors, dips not counted");
+    fibre.exact_energy = true;
+    bench_sampling(fibre, "factors");
     report("unfolding a material", nanoseconds(1, [&] { sink = unfold(fibre, tables[0]) ? 1.0f : 0.0f; }) / 1000, "us");
     bench_near(fibre, "unfolded");
     bench_unfolding(opened.pack, *std::make_unique<UnfoldedTables>());
     bench_far(opened.pack);
-    bench_sampling(fibre);
+    bench_sampling(fibre, "unfolded");
     if (json_file.empty()) return 0;
     std::FILE* out = std::fopen(json_file.c_str(), "w");
     if (out == nullptr) return std::fprintf(stderr, "%s: cannot be written\n", json_file.c_str()), 1;

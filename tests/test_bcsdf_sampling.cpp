@@ -118,12 +118,14 @@ TEST_CASE("near samples pass chi-squared with Sidak's correction, a broken pdf f
               samples = from_environment("MEDULLA_CHI_SAMPLES", 100000);
     const double level = 1 - std::pow(1 - 0.01, 1.0 / cases);
     Random r{std::mt19937_64(11)};
-    int passed = 0, broken_caught = 0;
+    const auto tables = std::make_unique<UnfoldedTables>();
+    int passed = 0, broken_caught = 0, unfolded = 0;
     float largest = 0;
     for (int i = 0; i < cases; ++i) {
         const FurParameters<3> p = random_fur(r, i);
         FurFibre<3> fibre;
         REQUIRE(usable(prepare(p, pack().view, fibre)));
+        unfolded += i % 4 > 1 && unfold(fibre, *tables);
         NearField<3> near;
         near_field(fibre, i % 8 == 7 ? 1.52f : 2.8f * (r.uniform() - 0.5f), 2 * r.uniform() - 1, near);
         NearSampler<3> sampler;
@@ -151,6 +153,7 @@ TEST_CASE("near samples pass chi-squared with Sidak's correction, a broken pdf f
         CHECK(d.mean_weight == Approx(energy).margin(8 / std::sqrt(double(samples))));
     }
     CHECK(passed == cases);
+    CHECK(unfolded >= cases / 4);
     CHECK(broken_caught >= cases - 1 - cases / 20);  // but where R itself is nearly absent
     CHECK(largest < 3 * 1.5f);  // the bound: channels times the table's overshoot between its knots
     std::printf("near: %d of %d pass chi-squared, %d of %d broken ones caught, largest weight %.3f\n", passed, cases,
@@ -162,12 +165,14 @@ TEST_CASE("far and interval samples pass chi-squared, a broken pdf fails", "[bcs
               samples = from_environment("MEDULLA_CHI_SAMPLES", 40000);
     const double level = 1 - std::pow(1 - 0.01, 1.0 / cases);
     Random r{std::mt19937_64(12)};
-    int passed = 0, broken_caught = 0;
+    const auto tables = std::make_unique<UnfoldedTables>();
+    int passed = 0, broken_caught = 0, unfolded = 0;
     float largest = 0;
     for (int i = 0; i < cases; ++i) {
         const FurParameters<3> p = random_fur(r, i + 3);
         FurFibre<3> fibre;
         REQUIRE(usable(prepare(p, pack().view, fibre)));
+        unfolded += i % 4 > 1 && unfold(fibre, *tables);
         FarField<3> far;
         const float low = i % 2 ? 1.9f * r.uniform() - 1 : -1, high = i % 2 ? low + (1 - low) * r.uniform() : 1;
         far_field(fibre, 2.4f * (r.uniform() - 0.5f), {low, high}, far);
@@ -194,6 +199,7 @@ TEST_CASE("far and interval samples pass chi-squared, a broken pdf fails", "[bcs
         CHECK(d.mean_weight == Approx(energy).margin(8 / std::sqrt(double(samples))));  // as for near
     }
     CHECK(passed == cases);
+    CHECK(unfolded >= cases / 4);
     CHECK(broken_caught == cases);
     CHECK(largest < 3 * 1.5f);  // channels, and the scattered lobes' shifts about their mean
     std::printf("far: %d of %d pass chi-squared, %d of %d broken ones caught, largest weight %.3f\n", passed, cases,

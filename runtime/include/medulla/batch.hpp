@@ -3,6 +3,7 @@
 #pragma once
 
 #include "medulla/config.hpp"
+#include "medulla/exit_rows.hpp"
 #include "medulla/near_field.hpp"
 
 namespace medulla {
@@ -10,65 +11,6 @@ namespace medulla {
 namespace detail {
 
 inline constexpr int batch_block = 16;
-
-/// C^N and C^M of one near field as splines over the exit alone: a lookup is then four products. Rows of y >= 0, then
-/// those of y < 0; some beyond the last are read and not used.
-struct ExitRows {
-    static constexpr std::uint32_t most = 2 * (most_exit_spans + 3);
-    alignas(16) float azimuthal[most + 4];         ///< [row]
-    alignas(16) float longitudinal[2 * most + 4];  ///< [row][back, forward]
-
-    template <int Channels>
-    MEDULLA_FN void set(const NearField<Channels>& near) noexcept {
-        const UnfoldedTables& tables = *near.fibre->tables;
-        const AzimuthalPoint& p = near.point;
-        const Four w0 = spread<0>(p.offset) * p.sigma, w1 = spread<1>(p.offset) * p.sigma,
-                   w2 = spread<2>(p.offset) * p.sigma, w3 = spread<3>(p.offset) * p.sigma;
-        const std::uint32_t rows = 2 * tables.azimuth_rows, step = 4 * rows;
-        for (std::uint32_t k = 0; k < rows; k += 4) {
-            Four at[4];
-            for (std::uint32_t i = 0; i < 4; ++i) {
-                const float* r = p.rows + 4 * (k + i < rows ? k + i : k);
-                at[i] = (w0 * aligned_four_at(r) + w1 * aligned_four_at(r + step)) +
-                        (w2 * aligned_four_at(r + 2 * step) + w3 * aligned_four_at(r + 3 * step));
-            }
-            transpose(at[0], at[1], at[2], at[3]);
-            store_four((at[0] + at[1]) + (at[2] + at[3]), azimuthal + k);
-        }
-        const LongitudinalPoint& m = near.longitudinal.point;
-        const Four w[4] = {spread<0>(m.weight), spread<1>(m.weight), spread<2>(m.weight), spread<3>(m.weight)};
-        const std::uint32_t length = 4 * tables.longitude_rows;
-        for (std::uint32_t k = 0; k < length; k += 4) {
-            const float* r = m.rows + k;
-            store_four((w[0] * four_at(r) + w[1] * four_at(r + length)) +
-                           (w[2] * four_at(r + 2 * length) + w[3] * four_at(r + 3 * length)),
-                       longitudinal + k);
-        }
-    }
-    /// Densities of TTs or TRTs at four places, >= 0.
-    MEDULLA_HOT Four azimuthal_densities(const UnfoldedTables& tables, const ExitPlaces& places) const noexcept {
-        Four at[4];
-        for (int i = 0; i < 4; ++i) {
-            const RowPoint exit = tables.azimuth.at(places.stretch[i], places.place[i]);
-            at[i] = exit.weight * four_at(azimuthal + exit.first + tables.azimuth_rows * (places.below >> i & 1u));
-        }
-        transpose(at[0], at[1], at[2], at[3]);
-        return greater((at[0] + at[1]) + (at[2] + at[3]), Four(0.0f));
-    }
-    /// M^s of Eq. 19 at four places. @param forwardness |phi| / pi
-    MEDULLA_HOT Four longitudinal_densities(const UnfoldedTables& tables, const ExitPlaces& places,
-                                            Four forwardness) const noexcept {
-        Four at[4];
-        for (int i = 0; i < 4; ++i) {
-            const RowPoint exit = tables.longitude_exit(places, i);
-            at[i] = lower_twice(exit.weight) * four_at(longitudinal + exit.first) +
-                    upper_twice(exit.weight) * four_at(longitudinal + exit.first + 4);
-        }
-        transpose(at[0], at[1], at[2], at[3]);
-        const Four zero(0.0f);
-        return (Four(1.0f) - forwardness) * greater(at[0] + at[2], zero) + forwardness * greater(at[1] + at[3], zero);
-    }
-};
 
 /// A near field with what a batch of exits asks for again and again.
 template <int Channels>
@@ -79,7 +21,9 @@ struct NearBatch {
 
     explicit MEDULLA_FN NearBatch(const NearField<Channels>& field) noexcept : near(field) {
         for (int p = 0; p < 3; ++p) longitudinal[p] = field.longitudinal.gaussian[p];
-        if (field.scattered) rows.set(field);
+        if (!field.scattered) return;
+        rows.set_azimuthal(*field.fibre->tables, field.point);
+        rows.set_longitudinal(*field.fibre->tables, field.longitudinal.point);
     }
     /// S at a block of exits, all of them valid: first every place, then every sum, so that one waits for memory while
     /// the next is on its way.

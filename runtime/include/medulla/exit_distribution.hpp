@@ -57,22 +57,22 @@ struct ExitDistribution {
 /// Share of an even density below which no value is held.
 inline constexpr float floor_share = 0.02f;
 
-/// Reads the contracted lobe at its knots (every few knots where there are more than most_bins spans on both halves).
-MEDULLA_FN void distribute(const TableView& table, const Contraction& contraction, ExitDistribution& out) noexcept {
-    const std::uint32_t k = table.parameter_axes();
-    const AxisView<float> axis = table.axis(k);
+/// Reads a lobe at its knots (every few knots where there are more than most_bins spans on both halves).
+/// @param axis of |y|  @param coefficients of the spline, row by row: f(row, positive, negative) sets those of y and -y
+template <class F>
+MEDULLA_FN void distribute(const AxisView<float>& axis, bool periodic, F&& coefficients,
+                           ExitDistribution& out) noexcept {
     const std::uint32_t stride = (2 * axis.spans + most_bins - 1) / most_bins;
     const int half = int((axis.spans + stride - 1) / stride);
     out.bins = 2 * half;
-    out.periodic = static_cast<Quantity>(table.layout.axes[k].quantity) == Quantity::phi;
+    out.periodic = periodic;
     const float floor_value = floor_share / (2 * axis.upper());
-    // The spline at a knot is the blend of three coefficients; each is a dot product with one row.
-    float even[3] = {}, odd[3] = {};
+    // The spline at a knot is the blend of three coefficients.
+    float positive[3] = {}, negative[3] = {};
     std::uint32_t known = 0;  // they hold rows known - 3 .. known - 1
     const auto next_row = [&]() {
-        even[0] = even[1], even[1] = even[2], odd[0] = odd[1], odd[1] = odd[2];
-        const detail::RowSums sum = detail::row_sums(table, k, known++, contraction.weight);
-        even[2] = sum.even * contraction.inverse_integral, odd[2] = sum.odd * contraction.inverse_integral;
+        positive[0] = positive[1], positive[1] = positive[2], negative[0] = negative[1], negative[1] = negative[2];
+        coefficients(known++, positive[2], negative[2]);
     };
     const auto put = [&](int i, float y, float value) {
         out.edge[i] = y;
@@ -86,10 +86,8 @@ MEDULLA_FN void distribute(const TableView& table, const Contraction& contractio
         const float y = axis.knot(std::int32_t(at)).t;
         const auto w = spline_weights(axis, Cell<float>{last ? at - 1 : at, y});
         const float* v = last ? w.w + 1 : w.w;
-        const float e = v[0] * even[0] + v[1] * even[1] + v[2] * even[2];
-        const float o = v[0] * odd[0] + v[1] * odd[1] + v[2] * odd[2];
-        put(half + i, y, e + o);
-        if (i > 0) put(half - i, -y, e - o);
+        put(half + i, y, v[0] * positive[0] + v[1] * positive[1] + v[2] * positive[2]);
+        if (i > 0) put(half - i, -y, v[0] * negative[0] + v[1] * negative[1] + v[2] * negative[2]);
     }
     float total = 0;
     out.cumulative[0] = 0;
@@ -100,6 +98,31 @@ MEDULLA_FN void distribute(const TableView& table, const Contraction& contractio
     const float inverse = 1 / total;  // total >= floor_share
     for (int i = 0; i <= out.bins; ++i) out.value[i] *= inverse, out.cumulative[i] *= inverse;
     out.cumulative[out.bins] = 1;
+}
+/// The same of a contracted lobe: each coefficient is a dot product with one row of factors.
+MEDULLA_FN void distribute(const TableView& table, const Contraction& contraction, ExitDistribution& out) noexcept {
+    const std::uint32_t k = table.parameter_axes();
+    distribute(
+        table.axis(k), static_cast<Quantity>(table.layout.axes[k].quantity) == Quantity::phi,
+        [&](std::uint32_t row, float& positive, float& negative) {
+            const detail::RowSums sum = detail::row_sums(table, k, row, contraction.weight);
+            positive = (sum.even + sum.odd) * contraction.inverse_integral;
+            negative = (sum.even - sum.odd) * contraction.inverse_integral;
+        },
+        out);
+}
+/// The same of unfolded tables. @param at coefficients of y >= 0, then those of y < 0  @param step from row to row
+MEDULLA_FN void distribute(const TableView& table, const float* at, std::uint32_t step,
+                           ExitDistribution& out) noexcept {
+    const std::uint32_t k = table.parameter_axes();
+    const AxisView<float> axis = table.axis(k);
+    const std::uint32_t below = step * (axis.spans + 3);
+    distribute(
+        axis, static_cast<Quantity>(table.layout.axes[k].quantity) == Quantity::phi,
+        [&](std::uint32_t row, float& positive, float& negative) {
+            positive = at[step * row], negative = at[below + step * row];
+        },
+        out);
 }
 
 }  // namespace medulla

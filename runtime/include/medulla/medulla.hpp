@@ -43,6 +43,7 @@
 #include "medulla/cross_section.hpp"
 #include "medulla/default_pack.hpp"
 #include "medulla/exit_distribution.hpp"
+#include "medulla/exit_rows.hpp"
 #include "medulla/far_field.hpp"
 #include "medulla/frame.hpp"
 #include "medulla/fur_fibre.hpp"

@@ -12,6 +12,7 @@
 
 #include "medulla/config.hpp"
 #include "medulla/exit_distribution.hpp"
+#include "medulla/exit_rows.hpp"
 #include "medulla/far_field.hpp"
 #include "medulla/near_field.hpp"
 
@@ -93,6 +94,12 @@ struct LongitudinalSampler {
     template <int Channels>
     MEDULLA_FN void prepare(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m) noexcept {
         side = m.theta_i < 0 ? -1.0f : 1.0f;
+        if (fibre.tables != nullptr) {
+            detail::ExitRows rows;
+            rows.set_longitudinal(*fibre.tables, m.point);
+            distribute(fibre.back.view, rows.longitudinal, 2, back);
+            return distribute(fibre.forward.view, rows.longitudinal + 1, 2, forward);
+        }
         Contraction contracted;
         contract(fibre.back, m.sigma, side * m.theta_i, contracted);
         distribute(fibre.back.view, contracted, back);
@@ -126,13 +133,18 @@ struct NearSampler {
         for (int c = 0; !field.scattered && c < Channels; ++c) energy.A[3][c] = energy.A[4][c] = 0;
         shares = detail::lobe_shares(energy);
         if (!field.scattered) return;
+        longitude.prepare(*field.fibre, field.longitudinal);
         const MaterialTable& table = field.fibre->azimuthal;
+        if (field.fibre->tables != nullptr) {
+            detail::ExitRows rows;
+            rows.set_azimuthal(*field.fibre->tables, field.point);
+            return distribute(table.view, rows.azimuthal, 1, azimuth);
+        }
         Contraction contracted;
         const float* weight = weights_at(table, field.longitudinal.absorbed, contracted.weight);
         contract(table, weight, sigma_point(table, field.longitudinal.sigma), last_point(table, field.offset),
                  contracted);
         distribute(table.view, contracted, azimuth);
-        longitude.prepare(*field.fibre, field.longitudinal);
     }
 
     /// Density per radian^2 of (theta_r, phi) of what `sample` returns.
@@ -178,6 +190,63 @@ struct NearSampler {
 /// side of the fibre, and this bounds the weight where the true lobe is wider.
 inline constexpr float even_share = 0.1f;
 
+namespace detail {
+
+template <int Channels>
+MEDULLA_FN float mean_energy(const ScatteringNode<Channels>& n) noexcept {
+    return mean(n.A[0]) + mean(n.A[1]);
+}
+
+/// C^N averaged by energy over the nodes at h < 0 and over those at h > 0, where there are any, from factors.
+template <int Channels>
+MEDULLA_FN void distribute_factors(const FarField<Channels>& field, const float (&energy)[2],
+                                   ExitDistribution (&azimuth)[2]) noexcept {
+    const MaterialTable& table = field.fibre().azimuthal;
+    const std::uint32_t stride = table.view.layout.rank_stride;
+    Contraction mean_lobe[2], at_sigma, at;
+    const float* weight = weights_at(table, field.near.longitudinal.absorbed, at_sigma.weight);
+    contract_axis(table.view, table.sigma_axis, field.near.longitudinal.sigma, weight, at_sigma.weight);
+    for (auto& lobe : mean_lobe)
+        for (std::uint32_t r = 0; r < stride; ++r) lobe.weight[r] = 0;
+    for (int i = 0; i < field.nodes; ++i) {
+        const ScatteringNode<Channels>& n = field.node[i];
+        contract_axis(table.view, table.last_axis, n.offset, at_sigma.weight, at.weight);
+        const float factor = mean_energy(n) * inverse_integral(table.view, at.weight);
+        for (std::uint32_t r = 0; r < stride; ++r) mean_lobe[n.side < 0 ? 0 : 1].weight[r] += factor * at.weight[r];
+    }
+    for (int side = 0; side < 2; ++side) {
+        if (!(energy[side] > 0)) continue;
+        mean_lobe[side].inverse_integral = inverse_integral(table.view, mean_lobe[side].weight);
+        distribute(table.view, mean_lobe[side], azimuth[side]);
+    }
+}
+/// The same from unfolded tables: what is averaged are the weights of rows of h, and then each row is read once.
+template <int Channels>
+MEDULLA_FN void distribute_rows(const FarField<Channels>& field, const float (&energy)[2],
+                                ExitDistribution (&azimuth)[2]) noexcept {
+    const UnfoldedTables& tables = *field.fibre().tables;
+    float weight[2][most_offset_spans + 3] = {};
+    for (int i = 0; i < field.nodes; ++i) {
+        const ScatteringNode<Channels>& n = field.node[i];
+        const RowPoint row = tables.offset.at(chord_coordinate(Same(n.offset)));
+        for (int t = 0; t < 4; ++t)
+            weight[n.side < 0 ? 0 : 1][row.first + std::uint32_t(t)] += mean_energy(n) * lane(row.weight, t);
+    }
+    for (int side = 0; side < 2; ++side) {
+        if (!(energy[side] > 0)) continue;
+        ExitRows rows;
+        rows.set_azimuthal(tables, [&](std::size_t from) {
+            Four sum;
+            for (std::uint32_t j = 0; j < tables.offset.spans + 3; ++j)
+                sum = sum + Four(weight[side][j]) * aligned_four_at(tables.azimuthal_rows(j) + from);
+            return sum * field.near.longitudinal.sigma_point;
+        });
+        distribute(field.fibre().azimuthal.view, rows.azimuthal, 1, azimuth[side]);
+    }
+}
+
+}  // namespace detail
+
 /// Draws from a FarField, which it borrows: h evenly over the range, a lobe by its energy at h, then that lobe;
 /// scattered azimuths from the tables averaged over each side of the fibre.
 template <int Channels = 3>
@@ -219,35 +288,23 @@ MEDULLA_FN void FarSampler<Channels>::prepare(const FarField<Channels>& field) n
     if (field.single) return single.prepare(field.near);
     if (field.nodes == 0) return;
     const FurFibre<Channels>& fibre = field.fibre();
-    const MaterialTable& table = fibre.azimuthal;
-    const std::uint32_t stride = table.view.layout.rank_stride;
-    Contraction mean_lobe[2], at_sigma, at;
-    const float* weight = weights_at(table, field.near.longitudinal.absorbed, at_sigma.weight);
-    contract_axis(table.view, table.sigma_axis, field.near.longitudinal.sigma, weight, at_sigma.weight);
     float energy[2] = {}, moment[2][2] = {};
-    for (auto& lobe : mean_lobe)
-        for (std::uint32_t r = 0; r < stride; ++r) lobe.weight[r] = 0;
     for (int i = 0; i < field.nodes; ++i) {
         const ScatteringNode<Channels>& n = field.node[i];
         const int side = n.side < 0 ? 0 : 1;
-        const float A = detail::mean(n.A[0]) + detail::mean(n.A[1]);
-        contract_axis(table.view, table.last_axis, n.offset, at_sigma.weight, at.weight);
-        const float factor = A * inverse_integral(table.view, at.weight);
-        for (std::uint32_t r = 0; r < stride; ++r) mean_lobe[side].weight[r] += factor * at.weight[r];
-        energy[side] += A;
+        energy[side] += detail::mean_energy(n);
         for (int p = 0; p < 2; ++p) {
-            moment[side][p] += A * n.centre[p];
+            moment[side][p] += detail::mean_energy(n) * n.centre[p];
             scattered_share[p] += n.share[p];
         }
     }
-    const float total = energy[0] + energy[1];
-    side_share = energy[1] / total;
-    for (int side = 0; side < 2; ++side) {
-        if (!(energy[side] > 0)) continue;
-        mean_lobe[side].inverse_integral = inverse_integral(table.view, mean_lobe[side].weight);
-        distribute(table.view, mean_lobe[side], azimuth[side]);
-        for (int p = 0; p < 2; ++p) centre[side][p] = moment[side][p] / energy[side];
-    }
+    side_share = energy[1] / (energy[0] + energy[1]);
+    for (int side = 0; side < 2; ++side)
+        for (int p = 0; p < 2 && energy[side] > 0; ++p) centre[side][p] = moment[side][p] / energy[side];
+    if (fibre.tables != nullptr)
+        detail::distribute_rows(field, energy, azimuth);
+    else
+        detail::distribute_factors(field, energy, azimuth);
     longitude.prepare(fibre, field.near.longitudinal);
 }
 

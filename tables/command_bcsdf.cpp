@@ -57,9 +57,11 @@ void warn_beyond_axes(const FurFibre<3>& fibre, const Longitudinal<3>& at, doubl
 }
 
 void run_bcsdf(const BcsdfWords& words) {
-    for (const auto& [name, degrees] : {std::pair("--theta-i", words.theta_i), std::pair("--theta-r", words.theta_r)})
+    const auto check = [](const char* name, double degrees, const char* range) {
         if (!(degrees >= -90 && degrees <= 90))
-            throw UsageError("{}: expected degrees in [-90, 90], found {}", name, degrees);
+            throw UsageError("{}: expected degrees in {}, found {}", name, range, degrees);
+    };
+    check("--theta-i", words.theta_i, "(-90, 90)"), check("--theta-r", words.theta_r, "[-90, 90]");
     if (!std::isfinite(words.phi)) throw UsageError("--phi: expected degrees, found {:g}", words.phi);
     const double phi = std::remainder(words.phi, 360.0);
     const OffsetRange range = range_of(words);

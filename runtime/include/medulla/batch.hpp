@@ -22,8 +22,8 @@ struct NearBatch {
     explicit MEDULLA_FN NearBatch(const NearField<Channels>& field) noexcept : near(field) {
         for (int p = 0; p < 3; ++p) longitudinal[p] = field.longitudinal.gaussian[p];
         if (!field.scattered) return;
-        rows.set_azimuthal(*field.fibre->tables, field.point);
-        rows.set_longitudinal(*field.fibre->tables, field.longitudinal.point);
+        rows.set_azimuthal(*field.longitudinal.tables, field.point);
+        rows.set_longitudinal(*field.longitudinal.tables, field.longitudinal.point);
     }
     /// S at a block of exits, all of them valid: first every place, then every sum, so that one waits for memory while
     /// the next is on its way.
@@ -36,7 +36,7 @@ struct NearBatch {
         ExitPlaces around[2][fours], along[fours];
         Four forwardness[fours];
         for (int i = 0; near.scattered && i < fours; ++i) {
-            const UnfoldedTables& tables = *fibre.tables;
+            const UnfoldedTables& tables = *m.tables;
             const Four azimuth = four_at(phi + 4 * i), theta = four_at(theta_r + 4 * i);
             for (int p = 0; p < 2; ++p)
                 around[p][i] = exit_places(turns_of(Four(near.side) * (azimuth - Four(near.centre[3 + p]))),
@@ -55,7 +55,7 @@ struct NearBatch {
                            S[c] + 4 * i);
         }
         for (int i = 0; near.scattered && i < fours; ++i) {
-            const UnfoldedTables& tables = *fibre.tables;
+            const UnfoldedTables& tables = *m.tables;
             const Four M = rows.longitudinal_densities(tables, along[i], forwardness[i]);
             const Four TTs = M * rows.azimuthal_densities(tables, around[0][i]),
                        TRTs = M * rows.azimuthal_densities(tables, around[1][i]);
@@ -92,7 +92,7 @@ MEDULLA_FN void eval_exits(const NearField<Channels>& near, int count, const flo
 template <int Channels>
 MEDULLA_FN void eval(const NearField<Channels>& near, int count, const float* theta_r, const float* phi,
                      Colour<Channels>* S) noexcept {
-    if (!near.valid || count < 8 || (near.scattered && near.fibre->tables == nullptr)) {
+    if (!near.valid || count < 8 || (near.scattered && near.longitudinal.tables == nullptr)) {
         for (int i = 0; i < count; ++i) S[i] = near.eval(theta_r[i], phi[i]);
         return;
     }

@@ -13,7 +13,7 @@ namespace medulla {
 namespace detail {
 
 /// C^N and C^M of one near field as splines over the exit alone: a lookup is then four products. Rows of y >= 0, then
-/// those of y < 0; some beyond the last are read and not used.
+/// those of y < 0; some beyond the last are written and not used.
 struct ExitRows {
     static constexpr std::uint32_t most = 2 * (most_exit_spans + 3);
     alignas(16) float azimuthal[most + 4];         ///< [row]

@@ -373,7 +373,7 @@ MEDULLA_FN void far_field(const FurFibre<Channels>& fibre, float theta_i, Offset
     far.gamma_rim = angle(far.rim);
     detail::place_cuts(far);
     if (!fibre.scattered) return;
-    if (fibre.tables == nullptr) {
+    if (far.near.longitudinal.tables == nullptr) {
         const Longitudinal<Channels>& m = far.near.longitudinal;
         const float* weight = weights_at(fibre.azimuthal, m.absorbed, far.sigma_weight);
         contract_axis(fibre.azimuthal.view, fibre.azimuthal.sigma_axis, m.sigma, weight, far.sigma_weight);
@@ -409,7 +409,7 @@ MEDULLA_FN void average_scattered(const FarField<Channels>& far, float phi, floa
                                   float (&TRTs)[Channels]) noexcept {
     for (int c = 0; c < Channels; ++c) TTs[c] = TRTs[c] = 0;
     const MaterialTable& table = far.fibre().azimuthal;
-    const UnfoldedTables* unfolded = far.fibre().tables;
+    const UnfoldedTables* unfolded = far.near.longitudinal.tables;
     Contraction contraction;
     for (int i = 0; i < far.nodes; ++i) {
         const ScatteringNode<Channels>& n = far.node[i];

@@ -53,6 +53,17 @@ MEDULLA_FN OffsetRange pixel_coverage(float h, float footprint, float radius, fl
     return {low < -1 ? -1.0f : (low > 1 ? 1.0f : low), high > 1 ? 1.0f : (high < -1 ? -1.0f : high)};
 }
 
+namespace detail {
+
+template <int Channels>
+MEDULLA_FN Colour<Channels> solid_angle_density(const LobeValues<Channels>& lobes, float theta_r) noexcept {
+    Colour<Channels> sum = angular_density(lobes);
+    for (float& value : sum.value) value = solid_angle_density(value, theta_r);
+    return sum;
+}
+
+}  // namespace detail
+
 /// S of Eq. 12 from directions: omega_i, omega_r and the offset h of the ray along omega_i.
 template <int Channels>
 MEDULLA_FN Colour<Channels> eval(const FurFibre<Channels>& fibre, Vector<float> omega_i, Vector<float> omega_r,
@@ -69,17 +80,34 @@ MEDULLA_FN Colour<Channels> eval(const FurFibre<Channels>& fibre, Vector<float> 
     return eval(fibre, i.theta, r.theta, r.phi - i.phi, range);
 }
 
-/// Energy per steradian about omega_r of a unit of light along omega_i: S cos^2 theta_i / cos theta_r = sum M N / cos
+/// Energy per steradian about an exit of a unit of light along omega_i: sum M N / cos theta_r = S cos^2 theta_i / cos
 /// theta_r. Its integral over omega_r is the albedo; over a sampler's pdf it is a sample's weight. It is what
 /// multiplies the radiance of a light at omega_r where omega_i is the camera's ray (next-event estimation).
-/// @param where offset h, or a range of offsets
-template <int Channels, class Where>
+template <int Channels>
+MEDULLA_FN Colour<Channels> density(const NearField<Channels>& near, float theta_r, float phi) noexcept {
+    return detail::solid_angle_density(near.lobes(theta_r, phi), theta_r);
+}
+template <int Channels>
+MEDULLA_FN Colour<Channels> density(const FarField<Channels>& far, float theta_r, float phi) noexcept {
+    return detail::solid_angle_density(far.lobes(theta_r, phi), theta_r);
+}
+/// The same from directions and the offset h of the ray along omega_i.
+template <int Channels>
 MEDULLA_FN Colour<Channels> density(const FurFibre<Channels>& fibre, Vector<float> omega_i, Vector<float> omega_r,
-                                    Where where) noexcept {
-    Colour<Channels> value = eval(fibre, omega_i, omega_r, where);
-    const float square = omega_i.y * omega_i.y + omega_i.z * omega_i.z, theta_r = angles_of(omega_r).theta;
-    for (float& v : value.value) v = detail::solid_angle_density(v * square, theta_r);
-    return value;
+                                    float h) noexcept {
+    const Angles<float> i = angles_of(omega_i), r = angles_of(omega_r);
+    NearField<Channels> near;
+    near_field(fibre, i.theta, h, near);
+    return density(near, r.theta, r.phi - i.phi);
+}
+/// The same averaged over offsets.
+template <int Channels>
+MEDULLA_FN Colour<Channels> density(const FurFibre<Channels>& fibre, Vector<float> omega_i, Vector<float> omega_r,
+                                    OffsetRange range) noexcept {
+    const Angles<float> i = angles_of(omega_i), r = angles_of(omega_r);
+    FarField<Channels> far;
+    far_field(fibre, i.theta, range, far);
+    return density(far, r.theta, r.phi - i.phi);
 }
 
 /// Density per steradian of omega_r. @param sampler a NearSampler or FarSampler prepared at omega_i's inclination

@@ -168,10 +168,10 @@ inline constexpr double most_imbalance = 1e-2;
 inline constexpr std::uint32_t halved_spans = 5;
 
 /// Multiplies the material's tables out into `tables`, which `fibre` then reads instead of the factors; takes half
-/// a millisecond with the default pack. false, and the fibre stays as it is, where it does not scatter, and where they
-/// do not fit: longer or fewer than 3 spans of an axis, longitudinal tables on different axes or not up to 90 degrees,
-/// a sigma axis that begins above the material's (or, where absorption goes with sigma, ends below it), eta so near 1
-/// that sigma's range is wide.
+/// a millisecond with the default pack. A field or sampler that was prepared before keeps to what it read then. false,
+/// and the fibre reads its factors, where it does not scatter, and where they do not fit: longer or fewer than 3 spans
+/// of an axis, longitudinal tables on different axes or not up to 90 degrees, a sigma axis that begins above the
+/// material's (or, where absorption goes with sigma, ends below it), eta so near 1 that sigma's range is wide.
 template <int Channels>
 MEDULLA_FN bool unfold(FurFibre<Channels>& fibre, UnfoldedTables& tables) noexcept {
     fibre.tables = nullptr;

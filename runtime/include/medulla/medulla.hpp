@@ -12,10 +12,10 @@
 //   density(fibre, omega_i, omega_r, h or range)    energy per steradian, as the samplers' pdf is
 //   eval(near, count, theta_r, phi, S)              many exits of a NearField at once
 //   eval(fibre, count, theta_i, h, theta_r, phi, S) many queries at once (h comes second here)
-//   NearField<3> near; near_field(fibre, theta_i, h, near); near.eval(theta_r, phi)              prepared for many
-//   exits FarField<3> far; far_field(fibre, theta_i, range, far); far.eval(theta_r, phi) NearSampler<3> sampler;
-//   sampler.prepare(near);  FarSampler<3> from a FarField FurSample<3> s = sampler.sample(RandomNumbers); theta_r, phi,
-//   pdf, weight; sampler.pdf(theta_r, phi)
+//   NearField<3> near; near_field(fibre, theta_i, h, near);     prepared for many exits: near.eval(theta_r, phi),
+//   FarField<3> far; far_field(fibre, theta_i, range, far);     density(near, theta_r, phi), and so of far
+//   NearSampler<3> sampler; sampler.prepare(near);              FarSampler<3> of a FarField
+//   FurSample<3> s = sampler.sample(random_numbers);            theta_r, phi, pdf, weight; sampler.pdf(theta_r, phi)
 // docs/bcsdf.md has every formula.
 //
 // Frame. The fibre runs along x, from tip to root; (y, z) is its cross-section. A direction has inclination theta =
@@ -24,8 +24,8 @@
 // towards +x. h in [-1, 1] is the offset of the incoming ray [fibre radii] along the left normal (counter-clockwise in
 // (y, z)) of its direction of travel -omega_i.
 //
-// i and r. 'i' is the direction that is known, with its h: the light's in light tracing, the camera ray's in path
-// tracing; 'r' is what is drawn. The model is not reciprocal (docs/bcsdf.md, 'Value and measure'): keep to one of them.
+// i and r. 'i' is the direction that is known, with its h: the camera ray's in path tracing; 'r' is what is drawn. The
+// model is not reciprocal, and Eq. 12 with the light as i does not keep energy (docs/bcsdf.md, 'Value and measure').
 //
 // Value. S = sum over lobes of M N / cos^2 theta_i (Eq. 12 of Yan et al. 2017). The cosine is the caller's, as with a
 // BSDF: with the light as i, L_r = integral of L_i S cos(theta_i) d omega_i, cos(theta_i) = sqrt(1 - x^2) of omega_i.

@@ -51,10 +51,11 @@ struct Longitudinal {
     Inclination<float> at = {};
     Absorption<Channels> absorption = {};
     TruncatedGaussians gaussian = {};
-    Four sigma_point;           ///< where sigma lies in unfolded tables; set where
-    LongitudinalPoint point;    ///< set where the fibre scatters and its tables are unfolded
-    Contraction back, forward;  ///< set where the fibre scatters and they are not
-    Contraction survival;       ///< of the axes before h, where the fibre has such a table and it is not unfolded
+    const UnfoldedTables* tables = nullptr;  ///< the fibre's when this was prepared
+    Four sigma_point;                        ///< where sigma lies in unfolded tables; set where
+    LongitudinalPoint point;                 ///< set where the fibre scatters and its tables are unfolded
+    Contraction back, forward;               ///< set where the fibre scatters and they are not
+    Contraction survival;  ///< of the axes before h, where the fibre has such a table and it is not unfolded
 };
 
 /// Sets m.back and m.forward: the longitudinal factors contracted to m.sigma and theta_i.
@@ -78,6 +79,7 @@ MEDULLA_FN void contract_longitudinal(const FurFibre<Channels>& fibre, float the
 template <int Channels>
 MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, Longitudinal<Channels>& m) noexcept {
     m.valid = false;
+    m.tables = fibre.tables;
     if (!usable(fibre.status) || !detail::within(theta_i, float(pi / 2))) return;
     const float cos_i = std::cos(theta_i);
     if (!(cos_i >= least_cosine)) return;
@@ -90,12 +92,12 @@ MEDULLA_FN void longitudinal_at(const FurFibre<Channels>& fibre, float theta_i, 
     m.sigma = fibre.parameters.sigma_ms * fibre.parameters.kappa * m.at.inverse_cos_t;
     m.absorbed = fibre.parameters.sigma_ma * fibre.parameters.kappa * m.at.inverse_cos_t;
     if (!fibre.scattered) return;
-    if (fibre.tables == nullptr) {
+    if (m.tables == nullptr) {
         if (fibre.survival) contract_survival(fibre.survival, m.sigma, fibre.parameters.g, m.absorbed, m.survival);
         return contract_longitudinal(fibre, theta_i, m);
     }
-    m.sigma_point = fibre.tables->sigma_at(m.sigma);
-    m.point = fibre.tables->longitudinal_at(std::abs(theta_i));
+    m.sigma_point = m.tables->sigma_at(m.sigma);
+    m.point = m.tables->longitudinal_at(std::abs(theta_i));
 }
 
 /// C^M back and forward straight from the factors. @param theta_r seen from the side of theta_i
@@ -118,7 +120,7 @@ MEDULLA_FN void longitudinal_lobes(const FurFibre<Channels>& fibre, const Longit
     if (!scattered) return;
     const float side = m.theta_i < 0 ? -theta_r : theta_r;
     const BackForward sides =
-        fibre.tables ? fibre.tables->longitudinal_density(m.point, side) : contracted_sides(fibre, m, side);
+        m.tables ? m.tables->longitudinal_density(m.point, side) : contracted_sides(fibre, m, side);
     lobes.M[3] = lobes.M[4] = blend_sides(sides, std::abs(wrap_angle(phi)) * float(1 / pi));
 }
 
@@ -172,13 +174,13 @@ struct NearField {
         if (!scattered) return at;
         const float inclined = longitudinal.theta_i < 0 ? -theta_r : theta_r;
         const float y[2] = {side * (phi - centre[3]), side * (phi - centre[4])};
-        if (fibre->tables == nullptr) {
+        if (longitudinal.tables == nullptr) {
             at.M = blend_sides(contracted_sides(*fibre, longitudinal, inclined),
                                std::abs(wrap_angle(phi)) * float(1 / pi));
             for (int p = 0; p < 2; ++p) at.D[p] = lobe(fibre->azimuthal, azimuthal, y[p]);
             return at;
         }
-        return medulla::scattered_densities(*fibre->tables, point, longitudinal.point, y[0], y[1], inclined, phi);
+        return medulla::scattered_densities(*longitudinal.tables, point, longitudinal.point, y[0], y[1], inclined, phi);
     }
 };
 
@@ -187,7 +189,7 @@ struct NearField {
 template <int Channels>
 MEDULLA_FN float survival_at(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m, float offset) noexcept {
     if (!fibre.survival) return 1;
-    if (fibre.tables != nullptr) return survival_of(m.absorbed, fibre.tables->survival_length(m.sigma_point, offset));
+    if (m.tables != nullptr) return survival_of(m.absorbed, m.tables->survival_length(m.sigma_point, offset));
     const AxisPoint at = axis_point(fibre.survival, 3, offset);
     float length = 0;
     for (std::uint32_t t = 0; t < 4; ++t)
@@ -233,8 +235,8 @@ MEDULLA_FN void offset_at(NearField<Channels>& near, float h) noexcept {
     if (!near.scattered) return;
     const float offset = std::abs(path.h_inside) / p.kappa;
     near.offset = offset < 1 ? offset : 1.0f;
-    if (fibre.tables != nullptr) {
-        near.point = fibre.tables->azimuthal_at(m.sigma_point, near.offset);
+    if (m.tables != nullptr) {
+        near.point = m.tables->azimuthal_at(m.sigma_point, near.offset);
         return;
     }
     const float* weight = weights_at(fibre.azimuthal, m.absorbed, near.azimuthal.weight);

@@ -112,10 +112,6 @@ MEDULLA_FN void eval_abreast(const FurFibre<Channels>& fibre, int count, const f
                              const float* theta_r, const float* phi, Colour<Channels>* S) noexcept {
     for (int from = 0, n; from < count; from += n) {
         n = count - from < 4 ? count - from : 4;
-        if (n == 1) {
-            S[from] = eval(fibre, theta_i[from], theta_r[from], phi[from], h[from]);
-            continue;
-        }
         float last[4][4] = {};  // fewer than four: the rest stands at 0
         for (int i = 0; n < 4 && i < n; ++i)
             last[0][i] = theta_i[from + i], last[1][i] = h[from + i], last[2][i] = theta_r[from + i],
@@ -140,10 +136,11 @@ MEDULLA_FN void eval_abreast(const FurFibre<Channels>& fibre, int count, const f
 template <int Channels>
 MEDULLA_FN void eval(const FurFibre<Channels>& fibre, int count, const float* theta_i, const float* h,
                      const float* theta_r, const float* phi, Colour<Channels>* S) noexcept {
-    if (usable(fibre.status) && (!fibre.scattered || fibre.tables != nullptr))
-        run_fused([&] { detail::eval_abreast(fibre, count, theta_i, h, theta_r, phi, S); });
-    else
-        run_widest([&] { detail::eval_singly(fibre, count, theta_i, h, theta_r, phi, S); });
+    if (!usable(fibre.status) || (fibre.scattered && fibre.tables == nullptr))
+        return run_widest([&] { detail::eval_singly(fibre, count, theta_i, h, theta_r, phi, S); });
+    const int last = count - 1, abreast = count % 4 == 1 ? last : count;  // one alone costs half of four
+    run_fused([&] { detail::eval_abreast(fibre, abreast, theta_i, h, theta_r, phi, S); });
+    if (abreast == last) S[last] = eval(fibre, theta_i[last], theta_r[last], phi[last], h[last]);
 }
 
 }  // namespace medulla

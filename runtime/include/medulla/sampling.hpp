@@ -94,9 +94,9 @@ struct LongitudinalSampler {
     template <int Channels>
     MEDULLA_FN void prepare(const FurFibre<Channels>& fibre, const Longitudinal<Channels>& m) noexcept {
         side = m.theta_i < 0 ? -1.0f : 1.0f;
-        if (fibre.tables != nullptr) {
+        if (m.tables != nullptr) {
             detail::ExitRows rows;
-            rows.set_longitudinal(*fibre.tables, m.point);
+            rows.set_longitudinal(*m.tables, m.point);
             distribute(fibre.back.view, rows.longitudinal, 2, back);
             return distribute(fibre.forward.view, rows.longitudinal + 1, 2, forward);
         }
@@ -135,9 +135,9 @@ struct NearSampler {
         if (!field.scattered) return;
         longitude.prepare(*field.fibre, field.longitudinal);
         const MaterialTable& table = field.fibre->azimuthal;
-        if (field.fibre->tables != nullptr) {
+        if (field.longitudinal.tables != nullptr) {
             detail::ExitRows rows;
-            rows.set_azimuthal(*field.fibre->tables, field.point);
+            rows.set_azimuthal(*field.longitudinal.tables, field.point);
             return distribute(table.view, rows.azimuthal, 1, azimuth);
         }
         Contraction contracted;
@@ -224,7 +224,7 @@ MEDULLA_FN void distribute_factors(const FarField<Channels>& field, const float 
 template <int Channels>
 MEDULLA_FN void distribute_rows(const FarField<Channels>& field, const float (&energy)[2],
                                 ExitDistribution (&azimuth)[2]) noexcept {
-    const UnfoldedTables& tables = *field.fibre().tables;
+    const UnfoldedTables& tables = *field.near.longitudinal.tables;
     float weight[2][most_offset_spans + 3] = {};
     for (int i = 0; i < field.nodes; ++i) {
         const ScatteringNode<Channels>& n = field.node[i];
@@ -239,7 +239,7 @@ MEDULLA_FN void distribute_rows(const FarField<Channels>& field, const float (&e
             Four sum;
             for (std::uint32_t j = 0; j < tables.offset.spans + 3; ++j)
                 sum = sum + Four(weight[side][j]) * aligned_four_at(tables.azimuthal_rows(j) + from);
-            return sum * field.near.longitudinal.sigma_point;
+            return sum * (Four(1 / energy[side]) * field.near.longitudinal.sigma_point);
         });
         distribute(field.fibre().azimuthal.view, rows.azimuthal, 1, azimuth[side]);
     }
@@ -301,7 +301,7 @@ MEDULLA_FN void FarSampler<Channels>::prepare(const FarField<Channels>& field) n
     side_share = energy[1] / (energy[0] + energy[1]);
     for (int side = 0; side < 2; ++side)
         for (int p = 0; p < 2 && energy[side] > 0; ++p) centre[side][p] = moment[side][p] / energy[side];
-    if (fibre.tables != nullptr)
+    if (field.near.longitudinal.tables != nullptr)
         detail::distribute_rows(field, energy, azimuth);
     else
         detail::distribute_factors(field, energy, azimuth);

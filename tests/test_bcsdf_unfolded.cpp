@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <random>
+#include <vector>
 
 #include "analytic_pack.hpp"
 #include "medulla/medulla.hpp"
@@ -111,6 +112,22 @@ TEST_CASE("holding an unfolded lobe at 0 hides no NaN", "[bcsdf]") {
     longitudinal.weight = Four(nan);
     CHECK(std::isnan(tables->longitudinal_density(longitudinal, 0.2f).back));
     CHECK(std::isnan(tables->longitudinal_density(longitudinal, 0.2f).forward));
+    // Through every door: one exit, a batch of exits, a batch of queries.
+    for (float* table : {tables->azimuthal, tables->longitudinal}) {
+        const std::size_t size =
+            table == tables->azimuthal ? std::size(tables->azimuthal) : std::size(tables->longitudinal);
+        const std::vector<float> kept(table, table + size);
+        std::fill(table, table + size, nan);
+        float theta_i[16], h[16], theta_r[16], phi[16];
+        for (int i = 0; i < 16; ++i) theta_i[i] = 0.3f, h[i] = 0.4f, theta_r[i] = -0.2f, phi[i] = 0.4f * float(i) - 3;
+        Colour<3> S[16];
+        CHECK(std::isnan(near.eval(theta_r[0], phi[0]).value[0]));
+        eval(near, 16, theta_r, phi, S);
+        for (const Colour<3>& at : S) CHECK(std::isnan(at.value[0]));
+        eval(fibre, 16, theta_i, h, theta_r, phi, S);
+        for (const Colour<3>& at : S) CHECK(std::isnan(at.value[0]));
+        std::copy(kept.begin(), kept.end(), table);
+    }
 }
 
 TEST_CASE("unfolded lobes integrate to their energies, to the ends of every range", "[bcsdf]") {

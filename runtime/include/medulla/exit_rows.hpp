@@ -1,11 +1,12 @@
 // Unfolded tables multiplied out further, for one light and offset: splines over the exit alone, which a batch of exits
-// and a sampler read. Rests on unfolded.hpp.
+// and a sampler read. Rests on unfolded.hpp and scattered_lookup.hpp.
 #pragma once
 
 #include <cstdint>
 
 #include "medulla/config.hpp"
 #include "medulla/lanes.hpp"
+#include "medulla/scattered_lookup.hpp"
 #include "medulla/unfolded.hpp"
 
 namespace medulla {
@@ -58,7 +59,7 @@ struct ExitRows {
             at[i] = exit.weight * four_at(azimuthal + exit.first + tables.azimuth_rows * (places.below >> i & 1u));
         }
         transpose(at[0], at[1], at[2], at[3]);
-        return greater((at[0] + at[1]) + (at[2] + at[3]), Four(0.0f));
+        return greater(Four(0.0f), (at[0] + at[1]) + (at[2] + at[3]));  // a NaN stays one
     }
     /// M^s of Eq. 19 at four places. @param forwardness |phi| / pi
     MEDULLA_HOT Four longitudinal_densities(const UnfoldedTables& tables, const ExitPlaces& places,
@@ -71,7 +72,7 @@ struct ExitRows {
         }
         transpose(at[0], at[1], at[2], at[3]);
         const Four zero(0.0f);
-        return (Four(1.0f) - forwardness) * greater(at[0] + at[2], zero) + forwardness * greater(at[1] + at[3], zero);
+        return blend_sides(greater(zero, at[0] + at[2]), greater(zero, at[1] + at[3]), forwardness);
     }
 };
 

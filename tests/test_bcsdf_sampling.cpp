@@ -379,6 +379,47 @@ TEST_CASE("light that is sampled and directions that are drawn tell of the same 
         }
 }
 
+TEST_CASE("what docs/bcsdf.md says of reciprocity and of Eq. 12's energy", "[bcsdf]") {
+    const PackView shipped = open_pack(default_pack_words, default_pack_size).pack;
+    const float degree = float(pi / 180);
+    const struct {
+        const char* animal;
+        float a, b;
+        double least, most;
+    } pairs[] = {{"cat", 75, -10, 2.58, 3.33}, {"bobcat", 60, -20, 1.41, 1.72}};
+    FurFibre<1> fibre;
+    for (const auto& pair : pairs) {
+        REQUIRE(prepare(parameters_of<1>(*find_preset(pair.animal)), shipped, fibre) == FurStatus::ok);
+        FarField<1> there, back;
+        far_field(fibre, pair.a * degree, OffsetRange{}, there), far_field(fibre, pair.b * degree, OffsetRange{}, back);
+        double least = 1e9, most = 0;
+        for (int i = 0; i <= 180; ++i) {
+            const float phi = float(i) * degree;
+            const double ratio = double(angular_density(there.lobes(pair.b * degree, phi)).value[0]) /
+                                 double(angular_density(back.lobes(pair.a * degree, phi)).value[0]);
+            least = std::min(least, ratio), most = std::max(most, ratio);
+        }
+        std::printf("%s: M N over M N with directions exchanged: %.2f to %.2f\n", pair.animal, least, most);
+        CHECK(least == Approx(pair.least).epsilon(0.01));
+        CHECK(most == Approx(pair.most).epsilon(0.01));
+    }
+    const double leaves[3][2] = {{0, 0.544}, {75, 4.72}, {85, 22.4}};  // bobcat, the light as i
+    for (const auto& [inclination, energy] : leaves) {
+        FarField<1> far;
+        far_field(fibre, float(inclination) * degree, OffsetRange{}, far);
+        double sum = 0;
+        constexpr int n = 120;
+        for (int j = 0; j < n; ++j)
+            for (int i = 0; i < n; ++i) {
+                const float theta_r = float(pi * ((i + 0.5) / n - 0.5)), phi = float(2 * pi * (j + 0.5) / n - pi);
+                sum += double(angular_density(far.lobes(theta_r, phi)).value[0]) * pi / n * 2 * pi / n *
+                       std::pow(std::cos(double(theta_r)) / std::cos(inclination * pi / 180), 2);
+            }
+        std::printf("bobcat, light from %g degrees as i: %.3g of it leaves by Eq. 12\n", inclination, sum);
+        CHECK(sum == Approx(energy).epsilon(0.01));
+    }
+}
+
 TEST_CASE("directions, offsets and coverage", "[bcsdf]") {
     for (float theta : {-1.5f, -0.3f, 0.0f, 1.2f})
         for (float phi : {-3.0f, 0.0f, 1.0f}) {

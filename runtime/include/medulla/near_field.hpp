@@ -52,7 +52,7 @@ struct Longitudinal {
     Absorption<Channels> absorption = {};
     TruncatedGaussians gaussian = {};
     const UnfoldedTables* tables = nullptr;  ///< the fibre's when this was prepared
-    Four sigma_point;                        ///< where sigma lies in unfolded tables; set where
+    Four sigma_point;                        ///< where sigma lies in unfolded tables; set where `point` is
     LongitudinalPoint point;                 ///< set where the fibre scatters and its tables are unfolded
     Contraction back, forward;               ///< set where the fibre scatters and they are not
     Contraction survival;  ///< of the axes before h, where the fibre has such a table and it is not unfolded

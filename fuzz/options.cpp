@@ -1,10 +1,10 @@
 // libFuzzer: the command lines of both programs, one word per line. The first byte says which program. Words are parsed
 // and checked as the program does it; nothing is run.
 #define main medulla_precompute_main
-#include "tables/medulla_precompute.cpp"
+#include "tables/programs/medulla_precompute.cpp"
 #undef main
 
-#include "tables/commands.hpp"
+#include "tables/programs/commands.hpp"
 
 namespace {
 
@@ -36,7 +36,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
     if (size == 0 || size > 4096) return 0;
     std::vector<std::string> words = words_of(data + 1, size - 1);
     for (const std::string& word : words)
-        if (word.empty()) return 0;            // refused before they are parsed (tables/program.cpp)
+        if (word.empty()) return 0;            // refused before they are parsed (tables/programs/program.cpp)
     std::reverse(words.begin(), words.end());  // CLI11 takes a vector from its end
     try {
         if (data[0] % 2 == 0) {

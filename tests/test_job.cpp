@@ -10,9 +10,9 @@
 #include <set>
 
 #include "tables/error.hpp"
-#include "tables/file.hpp"
-#include "tables/merge.hpp"
-#include "tables/precompute.hpp"
+#include "tables/job/precompute.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/merge.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;

@@ -1,4 +1,4 @@
-#include "sim2d/disc_deterministic.hpp"
+#include "sim2d/disc/deterministic.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "sim2d/disc_grid.hpp"
-#include "sim2d/disc_single.hpp"
-#include "sim2d/disc_solve.hpp"
+#include "sim2d/disc/grid.hpp"
+#include "sim2d/disc/single.hpp"
+#include "sim2d/disc/solve.hpp"
 #include "sim2d/elementary.hpp"
 
 namespace medulla::sim2d {

@@ -1,9 +1,9 @@
-#include "sim2d/disc_gmres.hpp"
+#include "sim2d/disc/gmres.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "sim2d/disc_lanes.hpp"
+#include "sim2d/disc/lanes.hpp"
 
 namespace medulla::sim2d {
 namespace {

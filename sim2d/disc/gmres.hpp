@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "sim2d/disc_transport.hpp"
+#include "sim2d/disc/transport.hpp"
 
 namespace medulla::sim2d {
 

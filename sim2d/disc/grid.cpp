@@ -1,4 +1,4 @@
-#include "sim2d/disc_grid.hpp"
+#include "sim2d/disc/grid.hpp"
 
 #include <Eigen/Core>
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "sim2d/disc_lanes.hpp"
+#include "sim2d/disc/lanes.hpp"
 
 #include <algorithm>
 

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "sim2d/disc_grid.hpp"
+#include "sim2d/disc/grid.hpp"
 
 namespace medulla::sim2d::lanes {
 

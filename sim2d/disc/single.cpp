@@ -1,4 +1,4 @@
-#include "sim2d/disc_single.hpp"
+#include "sim2d/disc/single.hpp"
 
 #include <algorithm>
 #include <cmath>

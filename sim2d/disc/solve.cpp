@@ -1,12 +1,12 @@
-#include "sim2d/disc_solve.hpp"
+#include "sim2d/disc/solve.hpp"
 
 #if defined(__SSE2__)
 #include <xmmintrin.h>
 #endif
 
-#include "sim2d/disc_gmres.hpp"
-#include "sim2d/disc_single.hpp"
-#include "sim2d/disc_transport.hpp"
+#include "sim2d/disc/gmres.hpp"
+#include "sim2d/disc/single.hpp"
+#include "sim2d/disc/transport.hpp"
 
 namespace medulla::sim2d {
 namespace {

@@ -4,7 +4,7 @@
 #include <complex>
 #include <vector>
 
-#include "sim2d/disc_grid.hpp"
+#include "sim2d/disc/grid.hpp"
 
 namespace medulla::sim2d {
 

@@ -1,10 +1,10 @@
-#include "sim2d/disc_transport.hpp"
+#include "sim2d/disc/transport.hpp"
 
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
-#include "sim2d/disc_lanes.hpp"
+#include "sim2d/disc/lanes.hpp"
 #include "sim2d/elementary.hpp"
 
 namespace medulla::sim2d {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "sim2d/disc_grid.hpp"
+#include "sim2d/disc/grid.hpp"
 
 namespace medulla::sim2d {
 

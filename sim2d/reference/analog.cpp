@@ -1,4 +1,4 @@
-#include "sim2d/analog.hpp"
+#include "sim2d/reference/analog.hpp"
 
 #include <algorithm>
 #include <cmath>

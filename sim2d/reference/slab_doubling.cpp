@@ -1,5 +1,5 @@
 // Adding-doubling (van de Hulst): R2 = R + T (1 - R R)^-1 R T, T2 = T (1 - R R)^-1 T.
-#include "sim2d/slab_doubling.hpp"
+#include "sim2d/reference/slab_doubling.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 #include "medulla/phase.hpp"
 #include "sim2d/elementary.hpp"
-#include "sim2d/slab_angles.hpp"
+#include "sim2d/slab/angles.hpp"
 
 namespace medulla::sim2d {
 

@@ -1,5 +1,5 @@
 // Quadrature of directions for the slab. The last bin before grazing is cut dyadically: every scale of mu is resolved.
-#include "sim2d/slab_angles.hpp"
+#include "sim2d/slab/angles.hpp"
 #include "sim2d/elementary.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // Slab lobes: closed-form single scattering integrated over each bin, plus the modes' multiply scattered radiance
 // interpolated from its nodes.
-#include "sim2d/slab_deterministic.hpp"
+#include "sim2d/slab/deterministic.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -11,9 +11,9 @@
 
 #include "medulla/phase.hpp"
 #include "sim2d/elementary.hpp"
-#include "sim2d/slab_angles.hpp"
-#include "sim2d/slab_modes.hpp"
-#include "sim2d/slab_single.hpp"
+#include "sim2d/slab/angles.hpp"
+#include "sim2d/slab/modes.hpp"
+#include "sim2d/slab/single.hpp"
 
 namespace medulla::sim2d {
 namespace {

@@ -1,13 +1,13 @@
 // Discrete ordinates by eigen-modes; the phase function is sampled where the directions resolve it, averaged over
 // the directions' cells where they do not, and its diagonal restores energy exactly in both cases.
-#include "sim2d/slab_modes.hpp"
+#include "sim2d/slab/modes.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "medulla/phase.hpp"
 #include "sim2d/elementary.hpp"
-#include "sim2d/slab_single.hpp"
+#include "sim2d/slab/single.hpp"
 
 namespace medulla::sim2d {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "sim2d/slab_angles.hpp"
+#include "sim2d/slab/angles.hpp"
 
 namespace medulla::sim2d {
 

@@ -1,5 +1,5 @@
 // Closed forms of single scattering in the slab; every difference of exponentials is an expm1 of a difference.
-#include "sim2d/slab_single.hpp"
+#include "sim2d/slab/single.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // Lanes of the tracer, compiled once per instruction set; the best one the machine has runs.
 // Positions and directions are floats (a lobe's error from that is below 1e-5), sums of a batch are flushed to doubles.
-#include "sim2d/tracer_kernel.hpp"
+#include "sim2d/tracer/kernel.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,16 +8,16 @@
 #include <utility>
 
 #include "sim2d/random.hpp"
-#include "sim2d/tracer_state.hpp"
+#include "sim2d/tracer/state.hpp"
 
 // Lanes are kept in structs, which vectors without a size cannot be.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sim2d/tracer_kernel.cpp"
+#define HWY_TARGET_INCLUDE "sim2d/tracer/kernel.cpp"
 #include "hwy/foreach_target.h"
 // After foreach_target.
 #include "hwy/highway.h"
-#include "sim2d/tracer_lanes-inl.hpp"
+#include "sim2d/tracer/lanes-inl.hpp"
 
 #if HWY_ONCE
 namespace medulla::sim2d {

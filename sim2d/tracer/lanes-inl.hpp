@@ -9,8 +9,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "sim2d/tracer_math-inl.hpp"
-#include "sim2d/tracer_state.hpp"
+#include "sim2d/tracer/math-inl.hpp"
+#include "sim2d/tracer/state.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace medulla::sim2d {

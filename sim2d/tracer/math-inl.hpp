@@ -12,7 +12,7 @@
 
 #include "hwy/contrib/math/math-inl.h"
 #include "hwy/highway.h"
-#include "sim2d/tracer_state.hpp"
+#include "sim2d/tracer/state.hpp"
 
 HWY_BEFORE_NAMESPACE();
 namespace medulla::sim2d {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "medulla/phase.hpp"
-#include "sim2d/tracer_kernel.hpp"
+#include "sim2d/tracer/kernel.hpp"
 
 namespace medulla::sim2d {
 

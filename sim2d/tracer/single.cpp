@@ -1,11 +1,11 @@
-#include "sim2d/tracer_single.hpp"
+#include "sim2d/tracer/single.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #include "medulla/phase.hpp"
 #include "sim2d/quadrature.hpp"
-#include "sim2d/slab_single.hpp"
+#include "sim2d/slab/single.hpp"
 
 namespace medulla::sim2d {
 namespace {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "sim2d/tracer_kernel.hpp"
+#include "sim2d/tracer/kernel.hpp"
 
 namespace medulla::sim2d {
 

@@ -1,4 +1,4 @@
-#include "sim2d/tracer.hpp"
+#include "sim2d/tracer/tracer.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,10 +6,10 @@
 #include <stdexcept>
 #include <vector>
 
-#include "sim2d/disc_single.hpp"
-#include "sim2d/slab_single.hpp"
-#include "sim2d/tracer_kernel.hpp"
-#include "sim2d/tracer_single.hpp"
+#include "sim2d/disc/single.hpp"
+#include "sim2d/slab/single.hpp"
+#include "sim2d/tracer/kernel.hpp"
+#include "sim2d/tracer/single.hpp"
 
 namespace medulla::sim2d {
 namespace {

@@ -1,5 +1,5 @@
 // The fast random solver: quasi-random walks that pay their expected exits into every bin, singly scattered light in
-// closed form. docs/physics.md, sections 1 to 4; its slow twin is sim2d/analog.hpp.
+// closed form. docs/physics.md, sections 1 to 4; its slow twin is sim2d/reference/analog.hpp.
 #pragma once
 
 #include <cstddef>

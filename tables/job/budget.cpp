@@ -1,4 +1,4 @@
-#include "tables/budget.hpp"
+#include "tables/job/budget.hpp"
 
 #include <omp.h>
 

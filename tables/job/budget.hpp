@@ -5,7 +5,7 @@
 #include <functional>
 #include <vector>
 
-#include "tables/simulate.hpp"
+#include "tables/job/simulate.hpp"
 
 namespace medulla::tables {
 

@@ -1,4 +1,4 @@
-#include "tables/forecast.hpp"
+#include "tables/job/forecast.hpp"
 
 #include <omp.h>
 

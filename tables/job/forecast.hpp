@@ -1,8 +1,8 @@
 // What a job would simulate and how long it will take, from a few of its slices.
 #pragma once
 
-#include "tables/schedule.hpp"
-#include "tables/simulate.hpp"
+#include "tables/job/schedule.hpp"
+#include "tables/job/simulate.hpp"
 
 namespace medulla::tables {
 
@@ -13,8 +13,8 @@ struct Forecast {
     std::size_t measured = 0;  ///< slices that were solved to know it
 };
 
-/// Expected costs (tables/schedule.hpp) of the slices, scaled by what some of them take: the median slice first, then
-/// its neighbours at even steps of the cost, until `patience` seconds are spent.
+/// Expected costs (tables/job/schedule.hpp) of the slices, scaled by what some of them take: the median slice first,
+/// then its neighbours at even steps of the cost, until `patience` seconds are spent.
 Forecast forecast(const Request& request, const std::vector<SliceId>& slices, double patience);
 
 }  // namespace medulla::tables

@@ -1,10 +1,10 @@
-#include "tables/material.hpp"
+#include "tables/job/material.hpp"
 
 #include <cmath>
 
 #include "tables/error.hpp"
-#include "tables/file.hpp"
-#include "tables/json_text.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/json_text.hpp"
 
 namespace medulla::tables {
 namespace {

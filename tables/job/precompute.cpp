@@ -1,4 +1,4 @@
-#include "tables/precompute.hpp"
+#include "tables/job/precompute.hpp"
 
 #include <omp.h>
 #include <signal.h>
@@ -7,10 +7,9 @@
 #include <filesystem>
 #include <mutex>
 
-#include "tables/budget.hpp"
 #include "tables/error.hpp"
+#include "tables/job/budget.hpp"
 #include "tables/parallel.hpp"
-#include "tables/program.hpp"
 
 namespace medulla::tables {
 namespace {

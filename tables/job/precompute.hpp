@@ -5,10 +5,10 @@
 #include <optional>
 #include <string>
 
-#include "tables/schedule.hpp"
-#include "tables/shards.hpp"
-#include "tables/simulate.hpp"
-#include "tables/tables_file.hpp"
+#include "tables/job/schedule.hpp"
+#include "tables/job/simulate.hpp"
+#include "tables/store/slice_files.hpp"
+#include "tables/store/tables_file.hpp"
 
 namespace medulla::tables {
 

@@ -1,4 +1,4 @@
-#include "tables/progress.hpp"
+#include "tables/job/progress.hpp"
 
 #include <fmt/core.h>
 #include <unistd.h>

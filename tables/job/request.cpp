@@ -1,4 +1,4 @@
-#include "tables/request.hpp"
+#include "tables/job/request.hpp"
 
 #include "tables/error.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tables/axis.hpp"
+#include "tables/table/axis.hpp"
 
 namespace medulla::tables {
 

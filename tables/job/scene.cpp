@@ -1,4 +1,4 @@
-#include "tables/scene.hpp"
+#include "tables/job/scene.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "tables/material.hpp"
-#include "tables/request.hpp"
+#include "tables/job/material.hpp"
+#include "tables/job/request.hpp"
 
 namespace medulla::tables {
 

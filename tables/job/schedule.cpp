@@ -1,4 +1,4 @@
-#include "tables/schedule.hpp"
+#include "tables/job/schedule.hpp"
 
 #include <algorithm>
 #include <charconv>

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "tables/request.hpp"
-#include "tables/slices.hpp"
+#include "tables/job/request.hpp"
+#include "tables/store/slices.hpp"
 
 namespace medulla::tables {
 

@@ -1,17 +1,17 @@
-#include "tables/simulate.hpp"
+#include "tables/job/simulate.hpp"
 
 #include <cmath>
 #include <cstring>
 #include <mutex>
 #include <optional>
 
-#include "sim2d/analog.hpp"
-#include "sim2d/disc_deterministic.hpp"
-#include "sim2d/slab_deterministic.hpp"
-#include "sim2d/tracer.hpp"
+#include "sim2d/disc/deterministic.hpp"
+#include "sim2d/reference/analog.hpp"
+#include "sim2d/slab/deterministic.hpp"
+#include "sim2d/tracer/tracer.hpp"
 #include "tables/error.hpp"
+#include "tables/job/schedule.hpp"
 #include "tables/parallel.hpp"
-#include "tables/schedule.hpp"
 
 namespace medulla::tables {
 namespace {

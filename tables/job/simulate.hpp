@@ -4,10 +4,10 @@
 
 #include <memory>
 
-#include "tables/progress.hpp"
-#include "tables/request.hpp"
-#include "tables/slices.hpp"
-#include "tables/table.hpp"
+#include "tables/job/progress.hpp"
+#include "tables/job/request.hpp"
+#include "tables/store/slices.hpp"
+#include "tables/table/table.hpp"
 
 namespace medulla::tables {
 

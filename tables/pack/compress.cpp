@@ -1,4 +1,4 @@
-#include "tables/compress.hpp"
+#include "tables/pack/compress.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "tables/error.hpp"
-#include "tables/rounding.hpp"
+#include "tables/pack/rounding.hpp"
 
 namespace medulla::tables {
 namespace {

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "tables/pack_degeneracy.hpp"
-#include "tables/parts.hpp"
-#include "tables/source.hpp"
-#include "tables/spline.hpp"
+#include "tables/pack/degeneracy.hpp"
+#include "tables/pack/parts.hpp"
+#include "tables/pack/source.hpp"
+#include "tables/pack/spline.hpp"
 #include "tensor/cp.hpp"
 
 namespace medulla::tables {

@@ -1,4 +1,4 @@
-#include "tables/pack_degeneracy.hpp"
+#include "tables/pack/degeneracy.hpp"
 
 #include <algorithm>
 #include <cmath>

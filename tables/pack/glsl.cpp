@@ -1,4 +1,4 @@
-#include "tables/glsl.hpp"
+#include "tables/pack/glsl.hpp"
 
 #include <fmt/core.h>
 

@@ -1,11 +1,11 @@
-#include "tables/parts.hpp"
+#include "tables/pack/parts.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
 #include "medulla/phase.hpp"
-#include "tables/source.hpp"
+#include "tables/pack/source.hpp"
 #include "tensor/hosvd.hpp"
 
 namespace medulla::tables {

@@ -8,9 +8,9 @@
 #include <algorithm>
 #include <vector>
 
-#include "tables/pack_writer.hpp"
-#include "tables/source.hpp"
-#include "tables/table.hpp"
+#include "tables/pack/source.hpp"
+#include "tables/pack/writer.hpp"
+#include "tables/table/table.hpp"
 #include "tensor/cp.hpp"
 
 namespace medulla::tables {

@@ -1,4 +1,4 @@
-#include "tables/rounding.hpp"
+#include "tables/pack/rounding.hpp"
 
 #include <cmath>
 

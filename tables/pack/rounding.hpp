@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "tables/pack_writer.hpp"
+#include "tables/pack/writer.hpp"
 
 namespace medulla::tables {
 

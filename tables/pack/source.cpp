@@ -1,4 +1,4 @@
-#include "tables/source.hpp"
+#include "tables/pack/source.hpp"
 
 #include <fmt/format.h>
 
@@ -13,10 +13,10 @@
 #include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
 #include "tables/error.hpp"
-#include "tables/file.hpp"
+#include "tables/pack/spline.hpp"
 #include "tables/parallel.hpp"
-#include "tables/spline.hpp"
-#include "tables/tables_file.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/tables_file.hpp"
 
 namespace medulla::tables {
 namespace {

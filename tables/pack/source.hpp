@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "medulla/pack.hpp"
-#include "tables/table.hpp"
+#include "tables/table/table.hpp"
 
 namespace medulla::tables {
 

@@ -1,4 +1,4 @@
-#include "tables/spline.hpp"
+#include "tables/pack/spline.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>

@@ -1,4 +1,4 @@
-#include "tables/pack_writer.hpp"
+#include "tables/pack/writer.hpp"
 
 #include <cmath>
 #include <cstring>

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "medulla/pack.hpp"
-#include "tables/spline.hpp"
+#include "tables/pack/spline.hpp"
 
 namespace medulla::tables {
 

@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include "medulla/medulla.hpp"
-#include "tables/commands.hpp"
-#include "tables/material.hpp"
+#include "tables/job/material.hpp"
+#include "tables/programs/commands.hpp"
 
 namespace medulla::tables {
 namespace {

@@ -1,10 +1,10 @@
 // furtable compress and furtable diff: make a pack, and say how far one file is from another.
 #include <fmt/core.h>
 
-#include "tables/commands.hpp"
-#include "tables/compress.hpp"
-#include "tables/file.hpp"
-#include "tables/tables_file.hpp"
+#include "tables/pack/compress.hpp"
+#include "tables/programs/commands.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/tables_file.hpp"
 
 namespace medulla::tables {
 namespace {

@@ -5,10 +5,10 @@
 #include <cmath>
 
 #include "medulla/lookup.hpp"
-#include "tables/commands.hpp"
-#include "tables/json_text.hpp"
-#include "tables/slices.hpp"
-#include "tables/tables_file.hpp"
+#include "tables/programs/commands.hpp"
+#include "tables/store/json_text.hpp"
+#include "tables/store/slices.hpp"
+#include "tables/store/tables_file.hpp"
 
 namespace medulla::tables {
 namespace {

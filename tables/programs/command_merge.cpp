@@ -1,10 +1,10 @@
 // furtable merge: the parts of many workers -> one tables file.
 #include <fmt/core.h>
 
-#include "tables/commands.hpp"
-#include "tables/merge.hpp"
-#include "tables/slices.hpp"
-#include "tables/tables_file.hpp"
+#include "tables/programs/commands.hpp"
+#include "tables/store/merge.hpp"
+#include "tables/store/slices.hpp"
+#include "tables/store/tables_file.hpp"
 
 namespace medulla::tables {
 namespace {

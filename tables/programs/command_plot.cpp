@@ -7,10 +7,10 @@
 #include <cstring>
 #include <filesystem>
 
-#include "tables/commands.hpp"
-#include "tables/file.hpp"
-#include "tables/glsl.hpp"
-#include "tables/plot.hpp"
+#include "tables/pack/glsl.hpp"
+#include "tables/programs/commands.hpp"
+#include "tables/programs/plot.hpp"
+#include "tables/store/file.hpp"
 
 extern char** environ;  // POSIX
 

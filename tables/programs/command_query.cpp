@@ -1,7 +1,7 @@
 // furtable query: one lobe from either file, in columns, CSV or JSON.
 #include <fmt/core.h>
 
-#include "tables/commands.hpp"
+#include "tables/programs/commands.hpp"
 
 namespace medulla::tables {
 namespace {

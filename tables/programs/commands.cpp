@@ -1,4 +1,4 @@
-#include "tables/commands.hpp"
+#include "tables/programs/commands.hpp"
 
 namespace medulla::tables {
 

@@ -4,9 +4,9 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 
-#include "tables/pack_degeneracy.hpp"
-#include "tables/program.hpp"
-#include "tables/source.hpp"
+#include "tables/pack/degeneracy.hpp"
+#include "tables/pack/source.hpp"
+#include "tables/programs/program.hpp"
 
 namespace medulla::tables {
 

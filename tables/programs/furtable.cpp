@@ -1,5 +1,5 @@
 // furtable: everything after the simulation.
-#include "tables/commands.hpp"
+#include "tables/programs/commands.hpp"
 
 int main(int argc, char** argv) {
     using namespace medulla::tables;

@@ -3,12 +3,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "sim2d/disc_deterministic.hpp"
-#include "tables/forecast.hpp"
-#include "tables/precompute.hpp"
-#include "tables/program.hpp"
-#include "tables/scene.hpp"
-#include "tables/simulate.hpp"
+#include "sim2d/disc/deterministic.hpp"
+#include "tables/job/forecast.hpp"
+#include "tables/job/precompute.hpp"
+#include "tables/job/scene.hpp"
+#include "tables/job/simulate.hpp"
+#include "tables/programs/program.hpp"
 
 namespace {
 

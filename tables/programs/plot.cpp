@@ -1,4 +1,4 @@
-#include "tables/plot.hpp"
+#include "tables/programs/plot.hpp"
 
 #include <fmt/format.h>
 

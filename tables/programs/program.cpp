@@ -1,4 +1,4 @@
-#include "tables/program.hpp"
+#include "tables/programs/program.hpp"
 
 #include <cstdio>
 #include <new>

@@ -17,15 +17,6 @@ class UsageError : public Error {
 /// It could not be done, and why stands on standard error already: exit status 1 without a further line.
 class Reported {};
 
-/// Ended by a signal: exit status 128 + its number.
-class Interrupted : public Error {
-  public:
-    template <class... Args>
-    explicit Interrupted(int number, fmt::format_string<Args...> format, Args&&... args)
-        : Error(format, std::forward<Args>(args)...), signal(number) {}
-    const int signal;
-};
-
 /// One line on standard error, whatever stood in a file or a word that `text` quotes.
 void say(const std::string& program, std::string text);
 

@@ -1,4 +1,4 @@
-#include "tables/file.hpp"
+#include "tables/store/file.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -1,4 +1,4 @@
-#include "tables/merge.hpp"
+#include "tables/store/merge.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -7,8 +7,8 @@
 #include <memory>
 
 #include "tables/error.hpp"
-#include "tables/shards.hpp"
-#include "tables/tables_file.hpp"
+#include "tables/store/slice_files.hpp"
+#include "tables/store/tables_file.hpp"
 
 namespace medulla::tables {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tables/table.hpp"
+#include "tables/table/table.hpp"
 
 namespace medulla::tables {
 

@@ -1,4 +1,4 @@
-#include "tables/sha256.hpp"
+#include "tables/store/sha256.hpp"
 
 #include <openssl/evp.h>
 

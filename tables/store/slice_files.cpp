@@ -1,4 +1,4 @@
-#include "tables/shards.hpp"
+#include "tables/store/slice_files.hpp"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -13,8 +13,8 @@
 #include <filesystem>
 
 #include "tables/error.hpp"
-#include "tables/file.hpp"
-#include "tables/json_text.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/json_text.hpp"
 
 namespace medulla::tables {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tables/slices.hpp"
+#include "tables/store/slices.hpp"
 
 namespace medulla::tables {
 

@@ -1,4 +1,4 @@
-#include "tables/slices.hpp"
+#include "tables/store/slices.hpp"
 
 #include <algorithm>
 #include <cstring>

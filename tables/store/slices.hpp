@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "tables/sha256.hpp"
-#include "tables/table.hpp"
+#include "tables/store/sha256.hpp"
+#include "tables/table/table.hpp"
 
 namespace medulla::tables {
 

@@ -1,4 +1,4 @@
-#include "tables/tables_file.hpp"
+#include "tables/store/tables_file.hpp"
 
 #include <hdf5.h>
 #include <hdf5_hl.h>
@@ -11,9 +11,9 @@
 #include <mutex>
 
 #include "tables/error.hpp"
-#include "tables/file.hpp"
-#include "tables/slices.hpp"
-#include "tables/zstd_filter.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/slices.hpp"
+#include "tables/store/zstd_filter.hpp"
 
 namespace medulla::tables {
 namespace {

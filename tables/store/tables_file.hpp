@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "tables/table.hpp"
+#include "tables/table/table.hpp"
 
 namespace medulla::tables {
 

@@ -1,4 +1,4 @@
-#include "tables/zstd_filter.hpp"
+#include "tables/store/zstd_filter.hpp"
 
 #include <hdf5.h>
 #include <zstd.h>

@@ -1,4 +1,4 @@
-#include "tables/axis.hpp"
+#include "tables/table/axis.hpp"
 
 #include <array>
 #include <charconv>

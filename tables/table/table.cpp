@@ -1,4 +1,4 @@
-#include "tables/table.hpp"
+#include "tables/table/table.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tables/axis.hpp"
+#include "tables/table/axis.hpp"
 
 namespace medulla::tables {
 
@@ -23,7 +23,7 @@ struct Table {
     std::vector<double> mean_length;           ///< [cells] mean path of the scattered light inside the medium [radii]
     std::string method;                        ///< how it was solved
     std::uint64_t seed = 0, paths = 0;         ///< of the random methods; 0 otherwise
-    double target_error = 0, time_budget = 0;  ///< of the request (tables/request.hpp); 0: not set
+    double target_error = 0, time_budget = 0;  ///< of the request (tables/job/request.hpp); 0: not set
 
     const Axis& axis(const std::string& name) const;
     bool has_axis(const std::string& name) const;

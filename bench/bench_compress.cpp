@@ -15,8 +15,8 @@
 
 #include "error_figure.hpp"
 #include "medulla/lookup.hpp"
-#include "tables/compress.hpp"
-#include "tables/tables_file.hpp"
+#include "tables/pack/compress.hpp"
+#include "tables/store/tables_file.hpp"
 #include "tensor/hosvd.hpp"
 
 using namespace medulla;

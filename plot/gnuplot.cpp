@@ -190,11 +190,9 @@ std::string run_gnuplot(const std::string& script) {
     pid_t child = 0;
     const int failed = posix_spawnp(&child, "gnuplot", &actions, nullptr, arguments, environ);
     posix_spawn_file_actions_destroy(&actions);
-    if (failed != 0)
-        throw std::runtime_error(
-            fmt::format("gnuplot draws the pictures and cannot be started ({}); Debian's package is "
-                        "gnuplot-nox",
-                        std::strerror(failed)));
+    if (failed == ENOENT)
+        throw std::runtime_error("gnuplot, which draws the pictures, is not installed (Debian's package: gnuplot-nox)");
+    if (failed != 0) throw std::runtime_error(fmt::format("gnuplot cannot be started: {}", std::strerror(failed)));
     int status = 0;
     while (waitpid(child, &status, 0) < 0)
         if (errno != EINTR) throw std::runtime_error(fmt::format("gnuplot: {}", std::strerror(errno)));

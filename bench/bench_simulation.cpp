@@ -320,7 +320,7 @@ plot::Figure figure_of(const json& numbers) {
     std::vector<plot::Panel> panels;
     for (const json& cell : numbers.value("cells", json::array())) {
         plot::Panel panel;
-        panel.title = plot::literal(cell.at("cell"));
+        panel.title = plot::printable(cell.at("cell"));
         for (std::size_t m = 0; m < kMethods; ++m) {
             plot::Curve c = curve(m);
             for (const json& point : cell.at("seconds_error").at(kNames[m]))

@@ -1,6 +1,7 @@
 #include "plot/figure.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace medulla::plot {
 namespace {
@@ -50,7 +51,31 @@ Axis symmetric_axis(const std::string& label, double reach) {
     return axis;
 }
 
-std::string literal(const std::string& text) {
+std::vector<std::size_t> thinned(const std::vector<double>& x, const std::vector<double>& y, double tolerance) {
+    // Douglas and Peucker, with the vertical distance: x increases.
+    std::vector<bool> kept(x.size(), false);
+    std::vector<std::pair<std::size_t, std::size_t>> open;
+    if (!x.empty()) kept.front() = kept.back() = true, open.emplace_back(0, x.size() - 1);
+    while (!open.empty()) {
+        const auto [first, last] = open.back();
+        open.pop_back();
+        std::size_t worst = first;
+        double most = tolerance;
+        for (std::size_t i = first + 1; i < last; ++i) {
+            const double line = y[first] + (y[last] - y[first]) * (x[i] - x[first]) / (x[last] - x[first]);
+            if (std::abs(y[i] - line) > most) most = std::abs(y[i] - line), worst = i;
+        }
+        if (worst == first) continue;
+        kept[worst] = true;
+        open.emplace_back(first, worst), open.emplace_back(worst, last);
+    }
+    std::vector<std::size_t> out;
+    for (std::size_t i = 0; i < kept.size(); ++i)
+        if (kept[i]) out.push_back(i);
+    return out;
+}
+
+std::string printable(const std::string& text) {
     std::string out;
     for (std::size_t i = 0; i < text.size();) {
         const std::size_t size = sequence_at(text, i);
@@ -60,7 +85,6 @@ std::string literal(const std::string& text) {
             ++i;
             continue;
         }
-        if (std::string("\\{}_^@&~").find(text[i]) != std::string::npos) out += '\\';
         out.append(text, i, size);
         i += size;
     }

@@ -1,7 +1,8 @@
 // A figure as data: rows of panels, curves in them, legends outside them. plot/gnuplot.hpp draws it.
-// Text is gnuplot's enhanced text ("{/Symbol q}_r" style markup: x_i, x^2); names from outside go through literal().
+// Text is UTF-8 without markup; names from outside go through printable().
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -51,10 +52,13 @@ struct Figure {
 /// Axis from the greatest power of ten times 1, 2 or 5 below `low` to the least above `high`, logarithmic.
 Axis log_axis(const std::string& label, double low, double high);
 
-/// Axis symmetric about 0 that holds `reach`, with two ticks on either side.
+/// Axis symmetric about 0 that contains `reach`, with two ticks on either side.
 Axis symmetric_axis(const std::string& label, double reach);
 
-/// The text as it stands: markup characters escaped, control characters and broken UTF-8 replaced by '?'.
-std::string literal(const std::string& text);
+/// Indices of the points, first and last among them, between which straight lines stay within `tolerance` of every y.
+std::vector<std::size_t> thinned(const std::vector<double>& x, const std::vector<double>& y, double tolerance);
+
+/// The text with '?' in place of control characters and of what is not UTF-8.
+std::string printable(const std::string& text);
 
 }  // namespace medulla::plot

@@ -21,7 +21,7 @@ namespace medulla::plot {
 namespace {
 
 // Layout [px].
-constexpr double cell_width = 330, left = 58, right = 14, legend_width = 96, header = 36, legend_height = 26;
+constexpr double cell_width = 330, left = 62, right = 14, legend_width = 108, header = 36, legend_height = 26;
 constexpr double title_height = 24, gap = 18, numbers_height = 18, label_height = 22;
 
 /// A string constant: nothing is special between single quotes but the quote itself.
@@ -50,12 +50,21 @@ std::string style_of(const Curve& curve) {
                        curve.width, dash_of(curve.stroke), curve.marks ? " pt 7 ps 0.45" : "");
 }
 
+/// A power of ten: "10⁻⁴".
+std::string power_of_ten(int exponent) {
+    constexpr const char* digits[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+    std::string out = exponent < 0 ? "10⁻" : "10";
+    for (const char c : std::to_string(std::abs(exponent))) out += digits[c - '0'];
+    return out;
+}
+
 /// 0.001 to 1000 as they are, others as powers of ten.
 std::string number(double x) {
     const double size = std::abs(x);
     if (size == 0 || (size > 0.9e-3 && size < 2e3)) return fmt::format("{:.4g}", x);
-    const double exponent = std::floor(std::log10(size) + 1e-9), factor = x / std::pow(10, exponent);
-    const std::string power = fmt::format("10^{{{:g}}}", exponent);
+    const int exponent = static_cast<int>(std::floor(std::log10(size) + 1e-9));
+    const double factor = x / std::pow(10, exponent);
+    const std::string power = power_of_ten(exponent);
     return std::abs(factor - 1) < 1e-6 ? power : fmt::format("{:.3g}·{}", factor, power);
 }
 
@@ -88,19 +97,24 @@ std::string ticks(const Axis& axis) {
 }
 
 std::string axis_text(const char* name, const Axis& axis) {
-    std::string out = fmt::format(
+    return fmt::format(
         "set {0}range [{1:.9g}:{2:.9g}]\n{3} logscale {0}\nset {0}tics nomirror textcolor rgb '#333333' ({4})\n", name,
         axis.low, axis.high, axis.log ? "set" : "unset", ticks(axis));
-    if (axis.label.empty()) return out + fmt::format("unset {}label\n", name);
-    return out + fmt::format("set {}label {} offset {}\n", name, quoted(axis.label), name[0] == 'x' ? "0,0.4" : "1,0");
 }
 
-std::string data_of(const Panel& panel, const Curve& curve, const std::string& name) {
+/// The points of a curve; on a line, those that change the picture by more than a twentieth of a pixel.
+std::string data_of(const Panel& panel, const Curve& curve, double height, const std::string& name) {
+    const Axis& axis = panel.y;
+    std::vector<double> y = curve.y, pixels(y.size());
+    for (std::size_t i = 0; i < y.size(); ++i) {
+        // What a logarithmic axis has no place for leaves the panel through its lower edge.
+        if (axis.log) y[i] = std::max(y[i], axis.low * 1e-3);
+        pixels[i] =
+            height * (axis.log ? std::log(y[i]) / std::log(axis.high / axis.low) : y[i] / (axis.high - axis.low));
+    }
     std::string out = name + " << EOD\n";
-    // What a logarithmic axis has no place for goes out of the panel's lower edge.
-    for (std::size_t i = 0; i < curve.x.size(); ++i)
-        out += fmt::format("{:.6g} {:.6g}\n", curve.x[i],
-                           panel.y.log ? std::max(curve.y[i], panel.y.low * 1e-3) : curve.y[i]);
+    for (const std::size_t i : thinned(curve.x, pixels, curve.marks || panel.x.log ? -1 : 0.05))
+        out += fmt::format("{:.6g} {:.6g}\n", curve.x[i], y[i]);
     return out + "EOD\n";
 }
 
@@ -115,14 +129,21 @@ std::string margins(const Box& box) {
         box.x0, box.x1, box.y0, box.y1);
 }
 
-std::string panel_text(const Panel& panel, const Box& box) {
+std::string panel_text(const Panel& panel, double height, const Box& box) {
     std::string out, plots;
     for (std::size_t i = 0; i < panel.curves.size(); ++i) {
         const std::string name = fmt::format("$curve{}", i);
-        out += data_of(panel, panel.curves[i], name);
+        out += data_of(panel, panel.curves[i], height, name);
         plots += fmt::format("{} {} using 1:2 {} notitle", i == 0 ? "plot" : ",", name, style_of(panel.curves[i]));
     }
     out += margins(box) + axis_text("x", panel.x) + axis_text("y", panel.y);
+    out +=
+        panel.x.label.empty() ? "unset xlabel\n" : fmt::format("set xlabel {} offset 0,0.4\n", quoted(panel.x.label));
+    // At a fixed place, however wide the numbers are: gnuplot's own label moves with them.
+    out += "unset label\n";
+    if (!panel.y.label.empty())
+        out += fmt::format("set label {} at screen {:.6f}, graph 0.5 center rotate by 90\n", quoted(panel.y.label),
+                           box.x0 * 10 / left);
     out += panel.title.empty() ? "unset title\n" : fmt::format("set title {} offset 0,-0.6\n", quoted(panel.title));
     out += "set border 3 lw 0.7 lc rgb '#777777'\nset grid x y lt 1 lc rgb '#e4e4e4' lw 0.6\nunset key\n";
     return out + (plots.empty() ? "plot NaN notitle" : plots) + "\n";
@@ -135,7 +156,7 @@ std::string legend_text(const std::vector<Curve>& legend, const Box& box, const 
     for (const Curve& curve : legend)
         plots += fmt::format("{} NaN {} title {}", plots.empty() ? "plot" : ",", style_of(curve), quoted(curve.label));
     return margins(box) +
-           "unset border\nunset xtics\nunset ytics\nunset xlabel\nunset ylabel\nunset title\nunset grid\n" +
+           "unset border\nunset xtics\nunset ytics\nunset xlabel\nunset label\nunset title\nunset grid\n" +
            "unset logscale\nset xrange [0:1]\nset yrange [0:1]\nset key " + key + "\n" + plots + "\n";
 }
 
@@ -230,12 +251,13 @@ std::string gnuplot_script(const Figure& figure, Format format) {
     std::string out = "set encoding utf8\n";
     if (format == Format::png)
         out += fmt::format(
-            "set terminal pngcairo enhanced size {:.0f},{:.0f} fontscale 2 linewidth 2 pointscale 2 font 'DejaVu "
+            "set terminal pngcairo noenhanced size {:.0f},{:.0f} fontscale 2 linewidth 2 pointscale 2 dashlength 1.5 "
+            "font 'DejaVu "
             "Sans,10'\n",
             2 * width, 2 * height);
     else
         out += fmt::format(
-            "set terminal svg enhanced size {:.0f},{:.0f} background rgb 'white' font 'DejaVu "
+            "set terminal svg noenhanced size {:.0f},{:.0f} background rgb 'white' font 'DejaVu "
             "Sans,Helvetica,sans-serif,11'\n",
             width, height);
     out += fmt::format("set tics nomirror scale 0.4\nset samples 2\nset multiplot title {} font ',14' offset 0,-0.3\n",
@@ -254,7 +276,7 @@ std::string gnuplot_script(const Figure& figure, Format format) {
         y += above(row);
         double x = 0;
         for (const Panel& panel : row.panels) {
-            out += panel_text(panel, box(x + left, x + cell_width - right, y, y + row.height));
+            out += panel_text(panel, row.height, box(x + left, x + cell_width - right, y, y + row.height));
             x += cell_width;
         }
         out += legend_text(row.legend, box(x, width, y, y + row.height),

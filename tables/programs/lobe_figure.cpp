@@ -74,7 +74,7 @@ RowOf row_of(const Source& first, TableKind kind, double absorption, const std::
 plot::Axis exit_axis_of(TableKind kind) {
     plot::Axis axis;
     const bool azimuthal = kind == TableKind::azimuthal;
-    axis.label = azimuthal ? "azimuth φ [degrees]" : "outgoing inclination θ_r [degrees]";
+    axis.label = azimuthal ? "azimuth φ [degrees]" : "outgoing inclination θᵣ [degrees]";
     axis.high = azimuthal ? 180 : 90, axis.low = -axis.high, axis.step = axis.high / 2;
     return axis;
 }
@@ -99,7 +99,7 @@ Panels panels_of(const Sources& sources, const std::vector<std::string>& names, 
                  const PlotPoint& point) {
     Panels panels;
     panels.lobes.title = fmt::format("σ = {:.3g}, g = {:.3g}", point.sigma, point.g);
-    if (row.absorbs) panels.lobes.title += fmt::format(", σ_a = {:.3g}", row.absorption);
+    if (row.absorbs) panels.lobes.title += fmt::format(", σₐ = {:.3g}", row.absorption);
     std::vector<double> shown;
     double reach = 0;
     std::vector<plot::Curve> further;
@@ -118,9 +118,9 @@ Panels panels_of(const Sources& sources, const std::vector<std::string>& names, 
             curve.x = exit_axis(exit_name(row.kind), own).values;
             for (double& x : curve.x) x *= 180 / pi;
             curve.y = sources[s]->lobe(row.kind, at, own);
+            shown.insert(shown.end(), curve.y.begin(), curve.y.end());
             if (s == 0) {
                 curve.colour = colours[p], curve.width = 2.6;
-                shown.insert(shown.end(), curve.y.begin(), curve.y.end());
                 panels.lobes.curves.push_back(std::move(curve));
                 continue;
             }
@@ -150,7 +150,7 @@ Panels panels_of(const Sources& sources, const std::vector<std::string>& names, 
 
 void add_rows(plot::Figure& figure, const Sources& sources, const std::vector<std::string>& names, const RowOf& of) {
     plot::Row lobes, errors;
-    errors.height = 80;
+    errors.height = 112;
     bool compared = false;
     for (const PlotPoint& point : of.at) {
         Panels panels = panels_of(sources, names, of, point);
@@ -164,7 +164,7 @@ void add_rows(plot::Figure& figure, const Sources& sources, const std::vector<st
         plot::Curve entry;
         entry.colour = colours[p], entry.width = 2.6;
         entry.label = of.kind == TableKind::azimuthal ? fmt::format("h = {:.2g}", of.offsets[p])
-                                                      : fmt::format("θ_i = {:.3g}°", of.offsets[p] * 180 / pi);
+                                                      : fmt::format("θᵢ = {:.3g}°", of.offsets[p] * 180 / pi);
         lobes.legend.push_back(std::move(entry));
     }
     if (compared)
@@ -178,19 +178,20 @@ void add_rows(plot::Figure& figure, const Sources& sources, const std::vector<st
 plot::Figure lobe_figure(const Sources& sources, const std::vector<std::string>& names,
                          const std::vector<PlotPoint>& points) {
     plot::Figure figure;
-    figure.title = "Scattered lobes of " + plot::literal(label_of(names, 0));
+    figure.title = (names[0] == "default" ? "Scattered lobes of the " : "Scattered lobes of ") +
+                   plot::printable(label_of(names, 0));
     for (std::size_t s = 1; s < sources.size(); ++s) {
         if (std::none_of(lobe_kinds.begin(), lobe_kinds.end(),
                          [&](TableKind kind) { return sources[0]->has(kind) && sources[s]->has(kind); }))
             throw Error("{}: expected a kind of lobe that {} has, found none", names[s], names[0]);
         plot::Curve entry;
         entry.stroke = strokes[(s - 1) % std::size(strokes)], entry.width = 1;
-        entry.label = plot::literal(label_of(names, s));
+        entry.label = plot::printable(label_of(names, s));
         figure.legend.push_back(std::move(entry));
     }
     if (!figure.legend.empty()) {
         plot::Curve entry;
-        entry.width = 2.6, entry.colour = plot::grey, entry.label = plot::literal(label_of(names, 0));
+        entry.width = 2.6, entry.colour = plot::grey, entry.label = plot::printable(label_of(names, 0));
         figure.legend.insert(figure.legend.begin(), std::move(entry));
     }
     for (const TableKind kind : lobe_kinds) {

@@ -219,8 +219,10 @@ std::string run_gnuplot(const std::string& script) {
         if (errno != EINTR) throw std::runtime_error(fmt::format("gnuplot: {}", std::strerror(errno)));
     std::string picture = read_all(output.get());
     if (status != 0 || picture.empty()) {
-        const std::string text = read_all(messages.get());
-        throw std::runtime_error("gnuplot failed: " + text.substr(0, text.find_last_not_of("\n") + 1));
+        std::string text = read_all(messages.get());  // the last line says what is wrong
+        text.erase(text.find_last_not_of(" \n") + 1);
+        text.erase(0, text.find_last_of('\n') + 1);
+        throw std::runtime_error(text.empty() ? "gnuplot failed" : "gnuplot failed: " + text);
     }
     return picture;
 }

@@ -160,9 +160,15 @@ nlohmann::ordered_json to_json(const Bench& bench) {
 
 /// Error against bytes, seconds and nanoseconds: a row of panels each, a column per kind, a curve per family.
 plot::Figure figure_of(const nlohmann::ordered_json& rows) {
-    const std::pair<const char*, const char*> families[] = {
-        {"CP, rank", plot::blue}, {"CP, within", plot::sky},       {"CP, non-negative", plot::green},
-        {"Tucker", plot::orange}, {"truncated SVD", plot::purple}, {"full ALS", plot::black}};
+    struct Family {
+        const char *method, *label, *colour;  ///< what the method's name begins with
+    };
+    const Family families[] = {{"CP, rank", "CP, by rank", plot::blue},
+                               {"CP, within", "CP, by size", plot::sky},
+                               {"CP, non-negative", "CP, non-negative", plot::green},
+                               {"Tucker", "Tucker", plot::orange},
+                               {"truncated SVD", "truncated SVD", plot::purple},
+                               {"full ALS", "full-tensor ALS", plot::black}};
     const std::pair<const char*, const char*> costs[] = {{"bytes of this kind of lobe", "bytes"},
                                                          {"processor seconds of a solve", "cpu_seconds"},
                                                          {"nanoseconds of a lookup", "lookup_ns"}};
@@ -173,19 +179,20 @@ plot::Figure figure_of(const nlohmann::ordered_json& rows) {
         for (const TableKind kind : lobe_kinds) {
             plot::Panel panel;
             panel.title = name_of(kind);
-            for (const auto& [family, colour] : families) {
+            for (const auto& [method, label, colour] : families) {
                 plot::Curve curve;
-                curve.label = family, curve.colour = colour, curve.marks = true, curve.width = 2;
+                curve.label = label, curve.colour = colour, curve.marks = true, curve.width = 2;
                 for (const auto& row : rows)
                     if (row.at("lobes") == name_of(kind) && row.value(key, 0.0) > 0 &&
-                        row.at("method").get<std::string>().rfind(family, 0) == 0)
+                        row.at("method").get<std::string>().rfind(method, 0) == 0)
                         curve.x.push_back(row.at(key)), curve.y.push_back(row.at("relative_l2"));
                 if (!curve.x.empty()) panel.curves.push_back(curve);
-                if (figure.legend.size() < std::size(families)) figure.legend.push_back({family, colour});
+                curve.x.clear(), curve.y.clear();
+                if (figure.legend.size() < std::size(families)) figure.legend.push_back(curve);
             }
             if (!panel.curves.empty()) panels.push_back(std::move(panel));
         }
-        bench::add_panels(figure, 3, cost, 0, std::move(panels));
+        bench::add_panels(figure, 3, cost, 1e-6, std::move(panels));
     }
     return figure;
 }

@@ -309,9 +309,10 @@ bool compare(json& out) {
 /// Of the numbers that --json writes.
 plot::Figure figure_of(const json& numbers) {
     const char* const colours[] = {plot::grey, plot::blue, plot::vermilion};
+    const char* const labels[] = {"analog tracer", "Monte Carlo tracer", "deterministic solver"};
     const auto curve = [&](std::size_t method) {
         plot::Curve c;
-        c.label = kNames[method], c.colour = colours[method], c.width = 2, c.marks = true;
+        c.label = labels[method], c.colour = colours[method], c.width = 2, c.marks = true;
         return c;
     };
     plot::Figure figure;

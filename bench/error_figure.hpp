@@ -13,7 +13,7 @@
 namespace medulla::bench {
 
 /// Adds rows of up to `columns` panels with logarithmic axes, all of one range that shows every point whose error is at
-/// least `least`.
+/// least `least` (> 0).
 inline void add_panels(plot::Figure& figure, std::size_t columns, const std::string& cost, double least,
                        std::vector<plot::Panel> panels) {
     double low[2] = {1e300, 1e300}, high[2] = {0, 0};

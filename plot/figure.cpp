@@ -1,6 +1,9 @@
 #include "plot/figure.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 namespace medulla::plot {
@@ -36,6 +39,9 @@ std::size_t sequence_at(const std::string& text, std::size_t at) {
 }  // namespace
 
 Axis log_axis(const std::string& label, double low, double high) {
+    if (!(low > 0 && low <= high && std::isfinite(high)))
+        throw std::invalid_argument(
+            fmt::format("logarithmic axis: expected 0 < low <= high, found {} and {}", low, high));
     Axis axis;
     axis.label = label, axis.log = true;
     axis.low = round_number(low, false), axis.high = round_number(high, true);

@@ -20,7 +20,7 @@ struct Curve {
     Stroke stroke = Stroke::solid;
     double width = 1.5;  ///< [px]
     bool marks = false;  ///< a dot at every point
-    std::vector<double> x, y;
+    std::vector<double> x = {}, y = {};
 };
 
 struct Axis {
@@ -49,7 +49,8 @@ struct Figure {
     std::vector<Row> rows;
 };
 
-/// Axis from the greatest power of ten times 1, 2 or 5 below `low` to the least above `high`, logarithmic.
+/// Logarithmic axis from the greatest power of ten times 1, 2 or 5 below `low` to the least above `high`; 0 < low <=
+/// high.
 Axis log_axis(const std::string& label, double low, double high);
 
 /// Axis symmetric about 0 that contains `reach`, with two ticks on either side.

@@ -21,7 +21,7 @@ namespace medulla::plot {
 namespace {
 
 // Layout [px].
-constexpr double cell_width = 330, left = 62, right = 14, legend_width = 108, header = 36, legend_height = 26;
+constexpr double cell_width = 330, left = 62, right = 14, legend_width = 108, header = 36, legend_line = 16;
 constexpr double title_height = 24, gap = 18, numbers_height = 18, label_height = 22;
 
 /// A string constant: nothing is special between single quotes but the quote itself.
@@ -58,10 +58,10 @@ std::string power_of_ten(int exponent) {
     return out;
 }
 
-/// 0.001 to 1000 as they are, others as powers of ten.
+/// 0.001 to 9000 as they are, others as powers of ten.
 std::string number(double x) {
     const double size = std::abs(x);
-    if (size == 0 || (size > 0.9e-3 && size < 2e3)) return fmt::format("{:.4g}", x);
+    if (size == 0 || (size > 0.9e-3 && size < 9.9e3)) return fmt::format("{:.4g}", x);
     const int exponent = static_cast<int>(std::floor(std::log10(size) + 1e-9));
     const double factor = x / std::pow(10, exponent);
     const std::string power = power_of_ten(exponent);
@@ -242,7 +242,9 @@ std::optional<Format> format_of(const std::string& path) {
 std::string gnuplot_script(const Figure& figure, Format format) {
     std::size_t columns = 1;
     bool side = false;
-    double height = header + (figure.legend.empty() ? 0 : legend_height);
+    // gnuplot breaks a legend of more entries than this into two lines.
+    const double legend_height = figure.legend.empty() ? 0 : 10 + legend_line * (figure.legend.size() > 4 ? 2 : 1);
+    double height = header + legend_height;
     for (const Row& row : figure.rows) {
         columns = std::max(columns, row.panels.size());
         side = side || !row.legend.empty();

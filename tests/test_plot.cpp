@@ -58,6 +58,12 @@ TEST_CASE("A logarithmic axis ends at 1, 2 or 5 times a power of ten and contain
         }
 }
 
+TEST_CASE("A logarithmic axis refuses what has no logarithm", "[plot]") {
+    for (const double low : {0.0, -1.0, double(NAN), double(INFINITY), 2.0}) CHECK_THROWS(log_axis("", low, 1));
+    CHECK_THROWS(log_axis("", 1, INFINITY));
+    CHECK_THROWS(log_axis("", 1, NAN));
+}
+
 TEST_CASE("A symmetric axis contains its reach; of 0 it is still an axis", "[plot]") {
     for (const double reach : {0.0, 1e-9, 0.013, 0.2, 7.0, 300.0}) {
         const Axis axis = symmetric_axis("", reach);

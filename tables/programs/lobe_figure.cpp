@@ -40,6 +40,12 @@ std::string label_of(const std::vector<std::string>& names, std::size_t s) {
     return base(names[s]);
 }
 
+/// The greatest value; 1 if that is 0, as in a pack whose sum is nowhere positive.
+double most(const std::vector<double>& values) {
+    const double greatest = *std::max_element(values.begin(), values.end());
+    return greatest > 0 ? greatest : 1;
+}
+
 /// The value below which the share `part` of the numbers lies.
 double quantile(std::vector<double> values, double part) {
     const auto at = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
@@ -109,7 +115,7 @@ Panels panels_of(const Sources& sources, const std::vector<std::string>& names, 
         (row.kind == TableKind::azimuthal ? at.h : at.theta_i) = row.offsets[p];
         const std::size_t bins = sources[0]->bins(row.kind);
         const std::vector<double> reference = sources[0]->lobe(row.kind, at, bins);
-        const double peak = *std::max_element(reference.begin(), reference.end());
+        const double peak = most(reference);
         for (std::size_t s = 0; s < sources.size(); ++s) {
             if (!sources[s]->has(row.kind) || (at.absorption != 0 && !sources[s]->absorbs())) continue;
             sources[s]->check(row.kind, at, names[s]);
@@ -141,7 +147,7 @@ Panels panels_of(const Sources& sources, const std::vector<std::string>& names, 
     // Over the colours of all lobes.
     for (plot::Curve& curve : further) panels.lobes.curves.push_back(std::move(curve));
     // Every lobe of the slab falls to 0 at +-90 degrees: the least of its values would leave no room for the others.
-    const double high = *std::max_element(shown.begin(), shown.end());
+    const double high = most(shown);
     panels.lobes.x = panels.errors.x = exit_axis_of(row.kind);
     panels.lobes.y = plot::log_axis("", std::max(quantile(shown, 0.03), high * 1e-4), high);
     panels.errors.y = plot::symmetric_axis("", reach);

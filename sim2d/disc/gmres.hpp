@@ -1,4 +1,4 @@
-// GMRES (Saad and Schultz 1986) on the columns of a field, each a linear system of its own.
+// GMRES (Saad and Schultz 1986) on the columns of a field; each column is an independent linear system.
 #pragma once
 
 #include <functional>

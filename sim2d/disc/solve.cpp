@@ -11,7 +11,7 @@
 namespace medulla::sim2d {
 namespace {
 
-/// High modes fade into denormals, which cost 100 cycles each: rounds them to zero while alive.
+/// High modes decay into denormals, which cost 100 cycles each: flushes them to zero in its lifetime.
 class FlushDenormals {
   public:
 #if defined(__SSE2__)

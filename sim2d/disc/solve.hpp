@@ -1,4 +1,4 @@
-// The linear solve behind DiscSolver: light of a plane wave that leaves the disc, for every chord and mode.
+// The linear solve behind DiscSolver: exit radiance under a plane wave, for every chord and mode.
 #pragma once
 
 #include <complex>
@@ -8,7 +8,7 @@
 
 namespace medulla::sim2d {
 
-/// Light scattered at least twice that leaves the disc, by chord and mode, divided by the energy F of the first
+/// Exit radiance of light scattered at least twice, by chord and mode, relative to the energy F of the first
 /// collisions on the chord, sigma / (sigma + sigma_a) (1 - exp(-2 (sigma + sigma_a) sqrt(1 - b^2))):
 /// I(b, phi) / F = c_0 + 2 Re sum over k >= 1 of c_k exp(i k phi).
 struct DiscExit {

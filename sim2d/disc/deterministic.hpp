@@ -18,6 +18,7 @@ struct DiscOptions {
     double gap = 0;              ///< largest gap between grazing directions on the fine grid [radians], > 0
     double rim = 0;              ///< step of acos(radius) from the rim inwards on the fine grid [radians], > 0
     bool estimate_error = true;  ///< solve a second, coarser grid
+    int most_steps = 60;         ///< of the iteration, >= 1; standard_error says what is left where they run out
 };
 
 /// All slices of one g. Threads may call `solve` at the same time;
@@ -30,8 +31,9 @@ class DiscSolver {
     /// One Profile per h over `bins` bins of phi.
     /// @param sigma [1 / disc radius], >= 0   @param h offsets in [-1, 1]
     /// energy: closed form; energy_error: what the un-normalised answer misses of it; standard_error: relative L2
-    /// difference of two grids over what a third-order error makes of it, 0 without estimate_error; mean_length: of the
-    /// scattered light. sigma = 0 is the limit.
+    /// difference of two grids over what a third-order error makes of it, 0 without estimate_error, and a bound, about,
+    /// of what the iteration left where most_steps ran out; mean_length: of the scattered light. sigma = 0 is the
+    /// limit.
     std::vector<Profile> solve(double sigma, const std::vector<double>& h, std::size_t bins = 720) const;
 
     /// The same in a medium that absorbs too: scattered light weighted by exp(-sigma_a length).

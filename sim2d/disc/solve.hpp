@@ -21,10 +21,13 @@ struct DiscExit {
     std::size_t modes = 0;       ///< number of modes, k = 0 included
     int iterations = 0;
     double residual = 0;  ///< relative to the right-hand side, the worst mode
+    /// Where the steps of either solve ran out: a bound of the relative error of what they left, about. 0: they did
+    /// not.
+    double unconverged = 0;
 };
 
 /// @param sigma scattering coefficient [1 / disc radius], > 0   @param sigma_a absorption coefficient, >= 0
-/// @param tolerance residual at which the iteration stops
-DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a, double tolerance);
+/// @param tolerance residual at which the iteration stops   @param most_steps it stops after, at any residual
+DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a, double tolerance, int most_steps);
 
 }  // namespace medulla::sim2d

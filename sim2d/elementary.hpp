@@ -145,11 +145,11 @@ inline double cos(double x) noexcept {
     return -detail::cos_near_0(2 * detail::half_pi_high - a, 2 * detail::half_pi_low);
 }
 
-/// Angle of (x, y) in [-pi, pi], finite arguments; 0 for (0, 0) with the sign of y.
+/// Angle of (x, y) in [-pi, pi], finite arguments; 0 for (0, 0) with the sign of y. NaN of NaN.
 inline double atan2(double y, double x) noexcept {
     const double a = std::abs(x), b = std::abs(y);
     if (b > 0x1p64 * a) return std::copysign(detail::half_pi_high, y);
-    double angle = a == 0 ? 0 : detail::atan_of_positive(b / a);
+    double angle = a == 0 && b == 0 ? 0 : detail::atan_of_positive(b / a);
     if (std::signbit(x)) angle = 2 * detail::half_pi_high - (angle - 2 * detail::half_pi_low);
     return std::copysign(angle, y);
 }

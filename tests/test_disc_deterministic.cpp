@@ -372,3 +372,33 @@ TEST_CASE("disc, deterministic: bad arguments", "[disc]") {
     CHECK_THROWS_AS(solver.solve(1, {1.5}), std::invalid_argument);
     CHECK_THROWS_AS(solver.solve(1, {0}, 0), std::invalid_argument);
 }
+
+TEST_CASE("Stated errors include the iteration error left at the limit of steps", "[disc]") {
+    // Lobes whose error still exceeds the target, against the converged ones.
+    const std::vector<double> h = {0, 0.5, 0.9};
+    int coarse = 0;
+    for (const double sigma : {2.0, 16.0, 60.0})
+        for (const double g : {-0.5, 0.0, 0.8})
+            for (const double absorption : {0.0, 1.0}) {
+                DiscOptions options;
+                options.target_error = 1e-2;
+                const std::vector<Profile> right = DiscSolver(g, options).solve(sigma, absorption, h, 72);
+                for (const int steps : {1, 2, 4, 8}) {
+                    options.most_steps = steps;
+                    for (const bool two_grids : {true, false}) {
+                        options.estimate_error = two_grids;
+                        const std::vector<Profile> found = DiscSolver(g, options).solve(sigma, absorption, h, 72);
+                        for (std::size_t i = 0; i < h.size(); ++i) {
+                            CAPTURE(sigma, g, absorption, steps, h[i]);
+                            const double error = distance(found[i].lobe, right[i].lobe);
+                            CHECK(error <= found[i].standard_error + 1e-3);  // where the steps sufficed: float rounding
+                            CHECK(std::abs(found[i].energy - right[i].energy) <= found[i].energy_error + 1e-3);
+                            CHECK(std::abs(found[i].mean_length / right[i].mean_length - 1) <=
+                                  found[i].standard_error + 2e-3);
+                            coarse += error > 1e-2;
+                        }
+                    }
+                }
+            }
+    CHECK(coarse > 100);
+}

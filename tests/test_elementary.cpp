@@ -111,6 +111,16 @@ TEST_CASE("Portable elementary functions at the ends of their ranges", "[element
     CHECK(portable::acos(1) == 0);
     CHECK(portable::asin(1) == std::asin(1.0));
     CHECK(portable::acos(-1) == std::acos(-1.0));
+    const double nan = std::nan("");
+    for (const auto f : {portable::log, portable::log1p, portable::exp, portable::expm1, portable::sin, portable::cos,
+                         portable::asin, portable::acos})
+        CHECK(std::isnan(f(nan)));
+    for (const double x : {0.0, -0.0, 1.0, -1.0, nan}) {
+        CHECK(std::isnan(portable::atan2(nan, x)));
+        CHECK(std::isnan(portable::atan2(x, nan)));
+    }
+    CHECK(std::isnan(portable::planar_hg_pdf(nan, 0.5)));
+    CHECK(std::isnan(portable::planar_hg_pdf(0.5, nan)));
     for (const double y : {0.0, -0.0, 1.0, -1.0})
         for (const double x : {0.0, -0.0, 1.0, -1.0}) {
             CAPTURE(y, x);

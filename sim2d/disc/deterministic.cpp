@@ -158,8 +158,9 @@ DiscSolver::DiscSolver(double g, const DiscOptions& options) : g_(g), options_(o
     require(options.circles == 0 || options.circles >= 6, "circles: expected at least 6, or 0");
     require(options.modes == 0 || options.modes >= 8, "modes: expected at least 8, or 0");
     require(options.target_error >= 1e-6 && options.target_error <= 0.1, "target_error: expected 1e-6 to 0.1");
-    require(options.rim >= 0, "rim: expected an angle > 0, or 0");
-    require(options.gap >= 0, "gap: expected an angle > 0, or 0");
+    require(options.rim == 0 || options.rim >= 1e-9, "rim: expected an angle of 1e-9 or more, or 0");
+    require(options.gap == 0 || options.gap >= 1e-4, "gap: expected an angle of 1e-4 or more, or 0");
+    require(options.most_steps >= 1, "most_steps: expected at least 1");
 }
 
 std::vector<Profile> DiscSolver::solve(double sigma, const std::vector<double>& h, std::size_t bins) const {
@@ -179,8 +180,9 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
     const double visible = std::max(sigma, 1e-30), tolerance = 0.02 * std::min(options_.target_error, 1e-3);
     const bool two_grids = options_.estimate_error;
     DiscExit coarse;
-    const DiscExit fine = solve_disc_transport(DiscGrid(g_, size), visible, sigma_a, tolerance);
-    if (two_grids) coarse = solve_disc_transport(DiscGrid(g_, coarser(size)), visible, sigma_a, tolerance);
+    const DiscExit fine = solve_disc_transport(DiscGrid(g_, size), visible, sigma_a, tolerance, options_.most_steps);
+    if (two_grids)
+        coarse = solve_disc_transport(DiscGrid(g_, coarser(size)), visible, sigma_a, tolerance, options_.most_steps);
     std::vector<Profile> profiles;
     for (const double offset : h) {
         Profile profile;
@@ -218,6 +220,7 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
             }
             profile.standard_error = share * std::sqrt(error / square) + (sigma > 0 ? fine.residual : 0);
         }
+        profile.standard_error += fine.unconverged, profile.energy_error += fine.unconverged * collided;
         // Truncated modes ring. The true lobe is not negative, so clamping at 0 reduces the error.
         for (double& x : profile.lobe) x = std::max(x, 0.0);
         const double sum = integral(profile.lobe);

@@ -18,6 +18,7 @@ struct DiscOptions {
     double gap = 0;              ///< largest gap between grazing directions on the fine grid [radians], > 0
     double rim = 0;              ///< step of acos(radius) from the rim inwards on the fine grid [radians], > 0
     bool estimate_error = true;  ///< solve a second, coarser grid
+    int most_steps = 60;         ///< limit of the iteration, >= 1; standard_error includes the error left at the limit
 };
 
 /// All slices of one g. Threads may call `solve` at the same time; a solve runs on one thread and does not depend on
@@ -30,8 +31,8 @@ class DiscSolver {
     /// One Profile per h over `bins` bins of phi.
     /// @param sigma [1 / disc radius], >= 0   @param h offsets in [-1, 1]
     /// energy: closed form; energy_error: its difference from the un-normalised solution; standard_error: relative L2
-    /// difference of two grids, extrapolated at third order, 0 without estimate_error; mean_length: of the scattered
-    /// light. sigma = 0 is the limit.
+    /// difference of two grids, extrapolated at third order, 0 without estimate_error, plus an approximate bound of the
+    /// iteration's error if most_steps ran out; mean_length: of the scattered light. sigma = 0 is the limit.
     std::vector<Profile> solve(double sigma, const std::vector<double>& h, std::size_t bins = 720) const;
 
     /// The same with absorption: scattered light is weighted with exp(-sigma_a length).

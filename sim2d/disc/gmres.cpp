@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "sim2d/disc/lanes.hpp"
 
@@ -61,8 +62,9 @@ void multiply(DiscField& a, const PerMode& scale, std::size_t active) {
 
 }  // namespace
 
-DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t stride, double tolerance) {
-    const std::size_t most = 60, size = right_side.size();
+DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t stride, double tolerance,
+                    std::size_t most) {
+    const std::size_t size = right_side.size();
     std::vector<DiscField> basis;
     basis.push_back(std::move(right_side));
     // Modes do not couple: each has its own Krylov space and rotations, but all share the passes over memory.
@@ -120,9 +122,12 @@ DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t
     }
     DiscIteration result;
     result.iterations = static_cast<int>(j);
+    result.converged = active == 0;
+    double unsolved = 0;  // squares of the residuals of columns 1 and on
     std::vector<PerMode> weight(std::max<std::size_t>(j, 1), PerMode(stride, 0.0));
     for (std::size_t k = 0; k < stride; ++k) {
         result.residual = std::max(result.residual, scale[k] > 0 ? std::abs(right[steps[k]][k]) / scale[k] : 0);
+        if (k > 0) unsolved += right[steps[k]][k] * right[steps[k]][k];
         for (std::size_t i = steps[k]; i-- > 0;) {
             double value = right[i][k];
             for (std::size_t c = i + 1; c < steps[k]; ++c) value -= h(i, c)[k] * weight[c][k];
@@ -135,6 +140,11 @@ DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t
         for (double& x : w) x = -x;
     result.solution.assign(size, DiscReal(0));
     subtract_all(result.solution, basis, weight.size(), stride, weight.data());
+    if (result.converged) return result;
+    const PerMode solved = square(result.solution, stride, stride);
+    const double first = std::abs(right[steps[0]][0]), others = std::accumulate(solved.begin() + 1, solved.end(), 0.0);
+    if (first > 0) result.left = first / std::sqrt(solved[0]);
+    if (unsolved > 0) result.left = std::max(result.left, std::sqrt(unsolved / others));
     return result;
 }
 

@@ -99,7 +99,7 @@ std::vector<double> radii(const DiscGridSize& size) {
 
 }  // namespace
 
-DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : size(wanted) {
+DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : mean_cosine(g), size(wanted) {
     radius = radii(size);
     for (std::size_t i = 0; i < circles(); ++i) {
         const double inner = i == 0 ? 0 : radius[i - 1];

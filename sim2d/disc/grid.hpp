@@ -33,6 +33,7 @@ class DiscGrid {
     /// @param g mean cosine, in (-1, 1)
     DiscGrid(double g, const DiscGridSize& size);
 
+    double mean_cosine;
     DiscGridSize size;
     std::vector<double> radius;      ///< of circle i, increasing, the last is 1
     std::vector<double> offset;      ///< b of chord m, increasing; chords [0, chords(i)) meet circle i

@@ -59,7 +59,7 @@ double escape(const Collisions& c, double sigma, double h, double phi) {
 Quadrature rule_for(double g, double width) {
     const double pole = g == 0 ? 100 : std::min(100.0, -portable::log(std::abs(g)) * 2 / width);
     const double rho = pole + std::sqrt(pole * pole + 1);
-    return unit_gauss_legendre(std::clamp(static_cast<int>(std::ceil(9.2 / portable::log(rho))), 2, 64));
+    return unit_gauss_legendre(static_cast<int>(std::clamp(std::ceil(9.2 / portable::log(rho)), 2.0, 64.0)));
 }
 
 }  // namespace

@@ -21,10 +21,12 @@ struct DiscExit {
     std::size_t modes = 0;       ///< number of modes, k = 0 included
     int iterations = 0;
     double residual = 0;  ///< relative to the right-hand side, the worst mode
+    /// Approximate bound of the relative error left by solves that reached their limit of steps; 0: none did.
+    double unconverged = 0;
 };
 
 /// @param sigma scattering coefficient [1 / disc radius], > 0   @param sigma_a absorption coefficient, >= 0
-/// @param tolerance residual at which the iteration stops
-DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a, double tolerance);
+/// @param tolerance residual at which the iteration stops   @param most_steps limit of steps at any residual
+DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a, double tolerance, int most_steps);
 
 }  // namespace medulla::sim2d

@@ -91,7 +91,7 @@ struct Weights {
             if (sum[b] > 0) variance += sum[b] * (square[b] / sum[b] - sum[b] / paths);
             norm += sum[b] * sum[b];
         }
-        p.standard_error = std::sqrt(variance / norm);
+        p.standard_error = std::sqrt(std::max(0.0, variance) / norm);
         p.mean_length = length / total;
         return p;
     }

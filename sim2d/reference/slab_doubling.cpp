@@ -16,7 +16,7 @@ SlabDoubling slab_doubling(double sigma, double g, std::size_t directions, doubl
     using Eigen::MatrixXd;
     // Layers of at most 5e-7: the box error (h / mu)^2 / 12 is below 1e-8 for mu > 2e-3, rounding grows as eps
     // 2^doublings.
-    const int doublings = std::max(0, int(std::ceil(std::log2(2 * sigma / 5e-7))));
+    const int doublings = sigma > 2.5e-7 ? int(std::ceil(std::log2(2 * sigma / 5e-7))) : 0;
     const Quadrature rule = gauss_legendre(directions);
     const Index n = Index(directions);
     SlabDoubling result;

@@ -89,9 +89,9 @@ HWY_INLINE VF SinPi(VF v) {
     return hn::MulAdd(hn::Mul(p, z), x, x);
 }
 
-/// 2^z for z <= 0, relative error 2e-7; at least 2^-126.
+/// 2^z for z <= 0, relative error 2e-7; at least 2^-126; NaN for NaN.
 HWY_INLINE VF Exp2(VF z) {
-    z = hn::Max(z, Constant(-126.0f));
+    z = hn::IfThenElse(hn::Lt(z, Constant(-126.0f)), Constant(-126.0f), z);  // hn::Max would drop NaN on x86
     const VI n = hn::NearestInt(z);
     const VF f = hn::Sub(z, hn::ConvertTo(F(), n));
     VF p = Constant(1.3333558e-3f);

@@ -55,7 +55,7 @@ SlabSingle slab_single_lobes(double sigma, double g, double theta_i, std::size_t
     const double width = pi / static_cast<double>(bins);
     const double pole = g == 0 ? 100 : std::min(100.0, -std::log(std::abs(g)) * 2 / width);
     const double rho = pole + std::sqrt(pole * pole + 1);
-    const int count = std::clamp(static_cast<int>(std::ceil(9.2 / std::log(rho))), 2, 64);
+    const int count = static_cast<int>(std::clamp(std::ceil(9.2 / std::log(rho)), 2.0, 64.0));
     const Quadrature plain = unit_gauss_legendre(std::max(count, bins < 90 ? 24 : 2));
     const Quadrature graded = unit_gauss_legendre(std::max(count, 32));
     const double mu_i = slab_cosine(theta_i), energy = slab_energy(sigma, theta_i);

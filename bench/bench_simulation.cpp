@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "bench_lobes.hpp"
-#include "plot_log.hpp"
+#include "error_figure.hpp"
 #include "sim2d/random.hpp"
 #include "sim2d/tracer/kernel.hpp"
 #include "tables/job/request.hpp"
@@ -30,7 +30,12 @@ using nlohmann::json;
 namespace {
 
 enum Method { kAnalog, kRandom, kDeterministic, kMethods };
-const std::vector<bench::Series> kSeries = {{"analog", "#888888"}, {"random", "#1f77b4"}, {"deterministic", "#d62728"}};
+const char* const kNames[] = {"analog", "random", "deterministic"};
+
+struct Point {
+    double seconds, error;
+};
+using Points = std::vector<Point>[kMethods];
 
 /// Processor time of all threads, which other work on the machine disturbs less than wall time.
 double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -41,10 +46,10 @@ double median(std::vector<double> v) {
     return v[v.size() / 2];
 }
 
-json to_json(const std::vector<std::vector<bench::Point>>& points) {
+json to_json(const Points& points) {
     json out;
-    for (std::size_t m = 0; m < points.size(); ++m)
-        for (const bench::Point& p : points[m]) out[kSeries[m].name].push_back({p.seconds, p.error});
+    for (std::size_t m = 0; m < kMethods; ++m)
+        for (const Point& p : points[m]) out[kNames[m]].push_back({p.seconds, p.error});
     return out;
 }
 
@@ -56,14 +61,14 @@ const TableCell kCells[] = {{true, 0.3, 0.0, 0.3},  {true, 0.3, 0.8, 0.3},  {tru
                             {false, 2, 0.8, 1.2},   {false, 12, 0.0, 0.5},  {false, 12, 0.9, 0.5}};
 
 /// On one thread, one after the other in one process; the reference is a deterministic solution on a finer grid.
-bench::Panel measure(const TableCell& c) {
-    bench::Panel panel{title(c), {-4, 2}, std::vector<std::vector<bench::Point>>(kMethods)};
+json measure(const TableCell& c) {
+    Points points;
     const Lobes truth = solve_deterministic(c, bench::kFinest);
     const auto add = [&](Method method, auto&& run) {
         const double start = now();
         const Lobes found = run();
         const double seconds = now() - start;
-        panel.points[method].push_back({seconds, bench::distance(found, truth)});
+        points[method].push_back({seconds, bench::distance(found, truth)});
     };
     for (const std::uint64_t paths : {512, 4096, 32768, 262144}) {
         add(kAnalog, [&] { return trace_analog(c, 4 * paths).lobes; });
@@ -71,14 +76,14 @@ bench::Panel measure(const TableCell& c) {
     }
     for (const bench::Resolution& r : bench::kResolutions)
         add(kDeterministic, [&] { return solve_deterministic(c, r); });
-    std::printf("%s\n", panel.title.c_str());
+    std::printf("%s\n", title(c).c_str());
     for (std::size_t m = 0; m < kMethods; ++m) {
-        std::printf("  %-14s", kSeries[m].name);
-        for (const bench::Point& p : panel.points[m]) std::printf("  %9.5f s %.2e", p.seconds, p.error);
+        std::printf("  %-14s", kNames[m]);
+        for (const Point& p : points[m]) std::printf("  %9.5f s %.2e", p.seconds, p.error);
         std::printf("\n");
     }
     std::fflush(stdout);
-    return panel;
+    return {{"cell", title(c)}, {"seconds_error", to_json(points)}};
 }
 
 // Tables --------------------------------------------------------------------------------------------------------------
@@ -118,12 +123,10 @@ void solve_table(bool disc, double target, double reference, Errors& e) {
 
 /// Seconds of both tables. Random methods: mean time of random cells times the number of cells; analog extrapolated
 /// from 20000 paths by 1 / error^2.
-bench::Panel measure_tables(double reference, std::size_t cells, json& out) {
-    bench::Panel panel{
-        "both default tables, processor seconds", {-1, 7}, std::vector<std::vector<bench::Point>>(kMethods)};
+json measure_tables(double reference, std::size_t cells) {
+    json out;
     const auto report = [&](Method method, double target, double seconds, json more) {
-        panel.points[method].push_back({seconds, target});
-        more.update({{"method", kSeries[method].name}, {"error", target}, {"processor_s", seconds}});
+        more.update({{"method", kNames[method]}, {"error", target}, {"processor_s", seconds}});
         out.push_back(more);
         std::fflush(stdout);
     };
@@ -190,14 +193,14 @@ bench::Panel measure_tables(double reference, std::size_t cells, json& out) {
         const double n = static_cast<double>(each.size()), mean = sum / n;
         const double seconds = table_cells * factor * mean;
         const double error = table_cells * factor * std::sqrt((squares / n - mean * mean) / (n - 1));
-        std::printf("both tables, %s, to %.0e: %.3g +- %.1g processor seconds, from %zu cells\n", kSeries[method].name,
+        std::printf("both tables, %s, to %.0e: %.3g +- %.1g processor seconds, from %zu cells\n", kNames[method],
                     target, seconds, error, each.size());
         report(method, target, seconds, {{"processor_s_error", error}, {"from_cells", each.size()}});
     };
     for (const double target : {1e-2, 3e-3, 1e-3}) estimate(kAnalog, target, cost[0], 1 / (target * target));
     estimate(kRandom, 1e-2, cost[1], 1);
     estimate(kRandom, 3e-3, cost[2], 1);
-    return panel;
+    return out;
 }
 
 // Random against deterministic ----------------------------------------------------------------------------------------
@@ -301,10 +304,50 @@ bool compare(json& out) {
     return agree;
 }
 
+// Figure --------------------------------------------------------------------------------------------------------------
+
+/// Of the numbers that --json writes.
+plot::Figure figure_of(const json& numbers) {
+    const char* const colours[] = {plot::grey, plot::blue, plot::vermilion};
+    const char* const labels[] = {"analog tracer", "Monte Carlo tracer", "deterministic solver"};
+    const auto curve = [&](std::size_t method) {
+        plot::Curve c;
+        c.label = labels[method], c.colour = colours[method], c.width = 2, c.marks = true;
+        return c;
+    };
+    plot::Figure figure;
+    figure.title = "Relative L2 error of a lobe (720 bins) against processor seconds";
+    for (std::size_t m = 0; m < kMethods; ++m) figure.legend.push_back(curve(m));
+    std::vector<plot::Panel> panels;
+    for (const json& cell : numbers.value("cells", json::array())) {
+        plot::Panel panel;
+        panel.title = plot::printable(cell.at("cell"));
+        for (std::size_t m = 0; m < kMethods; ++m) {
+            plot::Curve c = curve(m);
+            for (const json& point : cell.at("seconds_error").at(kNames[m]))
+                c.x.push_back(point.at(0)), c.y.push_back(point.at(1));
+            panel.curves.push_back(std::move(c));
+        }
+        panels.push_back(std::move(panel));
+    }
+    bench::add_panels(figure, 4, "processor seconds of one cell", 1e-6, std::move(panels));
+    if (!numbers.contains("tables")) return figure;
+    plot::Panel panel;
+    panel.title = "both default tables, by target error";
+    for (std::size_t m = 0; m < kMethods; ++m) {
+        plot::Curve c = curve(m);
+        for (const json& row : numbers.at("tables"))
+            if (row.at("method") == kNames[m]) c.x.push_back(row.at("processor_s")), c.y.push_back(row.at("error"));
+        panel.curves.push_back(std::move(c));
+    }
+    bench::add_panels(figure, 4, "processor seconds of both tables", 1e-6, {panel});
+    return figure;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-    std::string json_file, svg_file;
+    std::string json_file, figure_file, numbers_file;
     bool cells_too = true, tables = false, compared = false;
     double reference = 0;
     std::size_t cells = 32;
@@ -315,19 +358,20 @@ int main(int argc, char** argv) {
     app.add_option("--cells", cells, "with --tables: cells per table for the estimate of the random methods' time");
     app.add_flag("--compare", compared, "random against deterministic over every (sigma, g) of both tables");
     app.add_option("--json", json_file, "write the numbers to FILE");
-    app.add_option("--svg", svg_file, "plot them into FILE");
+    app.add_option("--figure", figure_file, "draw them into FILE: .svg, .png or .html");
+    app.add_option("--from", numbers_file, "measure nothing: draw the numbers that --json wrote into FILE");
     CLI11_PARSE(app, argc, argv);
 
-    json out = {{"instruction_set", tracer_target()}};
-    std::vector<bench::Panel> panels;
-    for (const TableCell& c : kCells) {
-        if (!cells_too) break;
-        panels.push_back(measure(c));
-        out["cells"].push_back({{"cell", panels.back().title}, {"seconds_error", to_json(panels.back().points)}});
+    if (!numbers_file.empty()) {
+        bench::save(figure_of(json::parse(std::ifstream(numbers_file))), figure_file);
+        return 0;
     }
-    if (tables) panels.push_back(measure_tables(reference, cells, out["tables"]));
+    json out = {{"instruction_set", tracer_target()}};
+    for (const TableCell& c : kCells)
+        if (cells_too) out["cells"].push_back(measure(c));
+    if (tables) out["tables"] = measure_tables(reference, cells);
     const bool agree = !compared || compare(out["compare"]);
     if (!json_file.empty()) std::ofstream(json_file) << out.dump(1) << '\n';
-    if (!svg_file.empty()) std::ofstream(svg_file) << bench::svg(panels, kSeries);
+    if (!figure_file.empty()) bench::save(figure_of(out), figure_file);
     return agree ? 0 : 1;
 }

@@ -13,12 +13,13 @@ ROOMS = {
     "sim2d/reference": {"sim2d", "sim2d/slab"},
     "sim2d/tracer": {"sim2d", "sim2d/disc", "sim2d/slab"},
     "tensor": set(),
+    "plot": set(),
     "tables": set(),
     "tables/table": {"tables", "sim2d", "sim2d/disc", "sim2d/slab"},
     "tables/store": {"tables/table"},
     "tables/job": {"tables/store", "sim2d/tracer", "sim2d/reference"},
     "tables/pack": {"tables/store", "tensor"},
-    "tables/programs": {"tables/job", "tables/pack"},
+    "tables/programs": {"tables/job", "tables/pack", "plot"},
 }
 
 

@@ -1,7 +1,7 @@
 // Ways to compress the same table, in one process and one thread: processor seconds, bytes, error and nanoseconds of
 // packs at ranks 4 to 96 and of the packs that bytes choose, of non-negative ones, of Tucker and of a truncated SVD in
 // the same number of bytes, and of full-tensor CP-ALS. Usage: bench_compress TABLES.h5... [--full] [--json FILE]
-// [--figure FILE] [--from JSON]; --full adds what takes minutes: packs that bytes choose, rank 16 of the disc's bins as
+// [--figure FILE] [--from JSON]; --full adds runs of minutes: packs that bytes choose, rank 16 of the disc's bins as
 // they are, by our solver and by full-tensor ALS.
 #include <fmt/core.h>
 #include <omp.h>
@@ -60,13 +60,13 @@ tensor::Tensor tensor_of(const Table& table, TableKind kind) {
     return tensor;
 }
 
-/// Error of a model, its bytes, and the seconds of finding it.
+/// Error and bytes of a model, and the seconds of the solve.
 struct Found {
     double error = 1, bytes = 0, seconds = 0;
 };
 
-/// Least error of a Tucker model within `bytes`: the sequentially truncated HOSVD, whose bases are the best of their
-/// sizes but for a factor sqrt(order). The seconds are those of one HOSVD, not of the search for its truncation.
+/// Smallest error of a Tucker model within `bytes`: the sequentially truncated HOSVD, which is optimal up to a factor
+/// of sqrt(order). Seconds of one HOSVD, without the search for its truncation.
 Found tucker(const tensor::Tensor& table, double bytes) {
     Found best;
     double low = std::log(1e-4), high = 0;
@@ -103,11 +103,11 @@ std::vector<Found> svd(const tensor::Tensor& table, const std::vector<double>& b
     return list;
 }
 
-/// A contraction of all parameter axes and one exit direction, cold in everything but the caches.
+/// Nanoseconds of a contraction of all parameter axes and one exit direction, with warm caches.
 double lookup_nanoseconds(const std::vector<unsigned char>& pack, TableKind kind) {
     const PackView view = open_pack(pack.data(), pack.size()).pack;
     const TableView& table = view[kind];
-    constexpr int count = 500, repeats = 200;  // short stretches, the best of many: other jobs interrupt few of them
+    constexpr int count = 500, repeats = 200;  // the best of many short runs, few of which other jobs interrupt
     double best = INFINITY;
     volatile float sink = 0;
     for (int repeat = 0; repeat < repeats; ++repeat) {
@@ -124,7 +124,7 @@ double lookup_nanoseconds(const std::vector<unsigned char>& pack, TableKind kind
     return best;
 }
 
-/// Bytes of one kind in a pack: its rows, scales and integrals; knots and text belong to none.
+/// Bytes of one kind in a pack: rows, scales and integrals, without shared knots and text.
 double kind_bytes(const TableReport& report, const std::vector<unsigned char>& pack) {
     const OpenResult opened = open_pack(pack.data(), pack.size());
     const TableView& table = opened.pack[report.kind];
@@ -227,7 +227,7 @@ int main(int argc, char** argv) {
     fmt::print("{:<26} {:<22} {:>9} {:>10} {:>10} {:>10} {:>9} {:>9}\n", "method", "lobes", "bytes", "rel. L2",
                "worst lobe", "energy", "cpu s", "ns");
     Bench bench;
-    // One table at a time, so that seconds are those of its solves.
+    // One table at a time, so that seconds belong to its solves.
     std::vector<Tables> single;
     if (tables.azimuthal) single.push_back({tables.azimuthal, {}, tables.program});
     if (tables.longitudinal) single.push_back({{}, tables.longitudinal, tables.program});

@@ -37,7 +37,7 @@ struct Point {
 };
 using Points = std::vector<Point>[kMethods];
 
-/// Processor time of all threads: the machine's other work costs less of it than of the wall's.
+/// Processor time of all threads, which other work on the machine disturbs less than wall time.
 double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 double wall() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -60,7 +60,7 @@ const TableCell kCells[] = {{true, 0.3, 0.0, 0.3},  {true, 0.3, 0.8, 0.3},  {tru
                             {false, 0.3, 0.0, 0.5}, {false, 0.3, 0.8, 0.5}, {false, 2, 0.0, 1.2},
                             {false, 2, 0.8, 1.2},   {false, 12, 0.0, 0.5},  {false, 12, 0.9, 0.5}};
 
-/// One thread, in turn in one process; truth is a deterministic solution on a finer grid.
+/// On one thread, one after the other in one process; the reference is a deterministic solution on a finer grid.
 json measure(const TableCell& c) {
     Points points;
     const Lobes truth = solve_deterministic(c, bench::kFinest);
@@ -92,7 +92,7 @@ struct Errors {
     std::vector<double> estimated, actual, energy;
 };
 
-/// One table by the deterministic solver on all threads, against a finer grid where there is one.
+/// One table by the deterministic solver on all threads, and its error against a finer grid if requested.
 void solve_table(bool disc, double target, double reference, Errors& e) {
     const tables::Request axes = tables::default_request();
     const std::size_t slices = axes.sigma.size() * axes.g.size();
@@ -105,7 +105,7 @@ void solve_table(bool disc, double target, double reference, Errors& e) {
     }
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t s = 0; s < slices; ++s) {
-        // The costly end first: great sigma.
+        // The expensive end first: large sigma.
         const std::size_t slice = slices - 1 - s;
         const double sigma = axes.sigma.values[slice / axes.g.size()];
         const std::size_t ig = slice % axes.g.size();
@@ -121,8 +121,8 @@ void solve_table(bool disc, double target, double reference, Errors& e) {
     }
 }
 
-/// Seconds of both tables. The random methods: what cells drawn at random took, times the number of cells; analog from
-/// 20000 paths by 1 / error^2.
+/// Seconds of both tables. Random methods: mean time of random cells times the number of cells; analog extrapolated
+/// from 20000 paths by 1 / error^2.
 json measure_tables(double reference, std::size_t cells) {
     json out;
     const auto report = [&](Method method, double target, double seconds, json more) {
@@ -142,7 +142,7 @@ json measure_tables(double reference, std::size_t cells) {
         const double worst_slab = *std::max_element(slab.estimated.begin(), slab.estimated.end());
         std::printf(
             "both tables, deterministic, target %.0e: %.1f s on %d threads (disc %.1f), %.1f processor seconds\n"
-            "  worst estimated error: disc %.1e, slab %.1e; disc's energy before scaling misses %.1e at most\n",
+            "  worst estimated error: disc %.1e, slab %.1e; error of the disc's energy before scaling %.1e at most\n",
             target, both_wall, omp_get_max_threads(), disc_wall, seconds, worst, worst_slab, energy);
         json more = {{"wall_s", both_wall},
                      {"threads", omp_get_max_threads()},
@@ -209,9 +209,9 @@ constexpr int kRepetitions = 8;
 
 /// Eight independent runs of the random solver per (sigma, g), each cell at another offset or inclination. Differences
 /// of their mean lobe from the deterministic one, projected on three functions of the bins, are noise if both are
-/// right: t-values of seven degrees, whose p-values fall evenly into twenty classes.
-/// Stated errors are honest if true squares less stated squares are 0 on average.
-/// @return whether p-values are even, in all nine tests at 1e-3 each, and errors honest within 5 deviations
+/// right: t-values of seven degrees of freedom, whose p-values are uniform over twenty classes.
+/// Stated errors are correct if true squares minus stated squares are 0 on average.
+/// @return whether p-values are uniform, in all nine tests at 1e-3 each, and errors correct within 5 deviations
 bool compare(json& out) {
     const tables::Request axes = tables::default_request();
     const char* const functions[] = {"cos", "cos 4", "random signs"};
@@ -220,7 +220,7 @@ bool compare(json& out) {
         const std::vector<double>& along = disc ? axes.h.values : axes.theta_i.values;
         const std::size_t sides = disc ? 1 : 2;
         std::vector<std::vector<double>> p(3 * sides);
-        std::vector<double> excess;  // (true error^2 less stated error^2) over the latter
+        std::vector<double> excess;  // (true error^2 - stated error^2) / stated error^2
         std::size_t skipped = 0;
         for (std::size_t ig = 0; ig < axes.g.size(); ++ig) {
             const bench::SliceSolver solver(disc, axes.g.values[ig], 3e-4, true);
@@ -238,13 +238,13 @@ bool compare(json& out) {
                         square[r] = std::pow(bench::relative_l2(found[r][side].lobe, truth), 2);
                         all += stated[r] = std::pow(found[r][side].standard_error, 2);
                     }
-                    // Where the noise is near what the deterministic solver promises, the difference is of both: at
-                    // twenty times it that adds at most 1/400.
+                    // Where the noise is close to the error of the deterministic solver, the difference contains both:
+                    // at twenty times that error it adds at most 1/400.
                     if (std::sqrt(all / kRepetitions) < 20 * exact[side].standard_error + 1e-5) {
                         ++skipped;
                         continue;
                     }
-                    // Of scale 1 by the other repetitions' errors, so that the mean is 0 if errors are honest.
+                    // Normalised by the errors of the other repetitions, so that the mean is 0 if errors are correct.
                     double sum = 0;
                     for (std::size_t r = 0; r < kRepetitions; ++r)
                         sum += (square[r] - stated[r]) / (all - stated[r]) * (kRepetitions - 1) / kRepetitions;
@@ -273,7 +273,7 @@ bool compare(json& out) {
         for (const double x : excess) deviation += (x - mean) * (x - mean);
         deviation = std::sqrt(deviation) / double(excess.size());
         std::printf(
-            "random against deterministic, %s: %zu (sigma, g), %zu lobes, %zu more below the other's error\n"
+            "random against deterministic, %s: %zu (sigma, g), %zu lobes, %zu skipped: below the error of the other\n"
             "  (true / stated error of the random solver)^2 - 1: %.3f +- %.3f\n",
             disc ? "disc" : "slab", axes.sigma.size() * axes.g.size(), excess.size(), skipped, mean, deviation);
         agree = agree && std::abs(mean) < 5 * deviation;
@@ -281,7 +281,7 @@ bool compare(json& out) {
         for (std::size_t t = 0; t < p.size(); ++t) {
             const double chi = test::evenness_p(p[t], 20);
             const double least = *std::min_element(p[t].begin(), p[t].end());
-            // The most extreme of n: Bonferroni.
+            // Bonferroni for the most extreme of n.
             const bool good = chi > 1e-3 && least * double(p[t].size()) > 1e-3;
             agree = agree && good;
             const char* lobe = disc ? "lobe" : (t < 3 ? "back" : "forward");
@@ -352,10 +352,10 @@ int main(int argc, char** argv) {
     double reference = 0;
     std::size_t cells = 32;
     CLI::App app("Run time against error of the solvers");
-    app.add_flag("!--no-cells", cells_too, "leave the twelve cells out");
+    app.add_flag("!--no-cells", cells_too, "skip the twelve cells");
     app.add_flag("--tables", tables, "time both default tables too");
-    app.add_option("--reference", reference, "with --tables: target error of a finer grid to take true errors from");
-    app.add_option("--cells", cells, "with --tables: cells per table that the random methods' time is estimated from");
+    app.add_option("--reference", reference, "with --tables: target error of a finer grid for the true errors");
+    app.add_option("--cells", cells, "with --tables: cells per table for the estimate of the random methods' time");
     app.add_flag("--compare", compared, "random against deterministic over every (sigma, g) of both tables");
     app.add_option("--json", json_file, "write the numbers to FILE");
     app.add_option("--figure", figure_file, "draw them into FILE: .svg, .png or .html");

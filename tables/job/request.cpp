@@ -11,17 +11,8 @@ Method method_of(const std::string& name) {
 }
 
 const char* name_of(Method method) {
-    switch (method) {
-        case Method::automatic:
-            return "auto";
-        case Method::analog:
-            return "analog";
-        case Method::mc:
-            return "mc";
-        case Method::deterministic:
-            return "deterministic";
-    }
-    return "?";
+    constexpr const char* names[] = {"auto", "analog", "mc", "deterministic"};
+    return names[static_cast<std::size_t>(method)];
 }
 
 Request default_request() {
@@ -50,7 +41,7 @@ void check_request(const Request& request) {
         throw Error("--sigma-range: expected at most {:g}, found {:g}", greatest_radius, request.sigma.values.back());
     if (request.bins < 8 || request.bins > 4096 || request.bins % 2 != 0)
         throw Error("--bins: expected an even number from 8 to 4096, found {}", request.bins);
-    const int most_bits = request.method == Method::analog ? 40 : 35;  // what the tracers have random numbers for
+    const int most_bits = request.method == Method::analog ? 40 : 35;  // the tracers' counters allow no more
     if (request.paths < 1 || request.paths > (std::uint64_t{1} << most_bits))
         throw Error("--paths: expected 1 to 2^{}, found {}", most_bits, request.paths);
     if (request.target_error != 0 && !(request.target_error >= least_target && request.target_error <= greatest_target))

@@ -382,11 +382,11 @@ class Programs(unittest.TestCase):
         self.assertNotIn("error [% of peak]", texts("one.svg"))
         single = ["--sigma-range", "2:2", "--g-range", "0.95:0.95", "--h-range", "0:0", "--theta-range", "0:0", "--bins",
                   "8", "--method", "deterministic", "--progress", "none"]
-        name = "o'ne_{x}\n`touch pwned`.h5"
+        name = os.fsdecode(b"o'ne_{x}\n`touch pwned`<b>&\xff.h5")
         self.assertEqual(run("medulla-precompute", "-o", self.path(name), *single)[0], 0)
         self.assertEqual(plot("single.svg", name, "default").returncode, 0)
         self.assertEqual(texts("single.svg").count("σ = 2, g = 0.95"), 3)
-        self.assertIn("o'ne_{x}?`touch pwned`.h5", texts("single.svg"))
+        self.assertIn("o'ne_{x}?`touch pwned`<b>&?.h5", texts("single.svg"))
         self.assertFalse(os.path.exists(self.path("pwned")))
         self.assertEqual(plot("at.svg", "t.h5", "--at", "1:0.6", "--at", "4:0").returncode, 0)
         self.assertIn("σ = 4, g = 0", texts("at.svg"))

@@ -2,7 +2,6 @@
 // The same on every machine: costs are whole numbers made with + - * / alone.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 
@@ -26,12 +25,9 @@ struct Shard {
 /// lowest index). The shares of all workers are disjoint and together everything.
 std::vector<SliceId> share_of(const Request& request, const std::vector<SliceId>& slices, Shard shard);
 
+inline constexpr std::uint32_t most_shards = 1000000;
+
 /// "I/N", 1 <= I <= N. Throws Error that names --shard.
 Shard parse_shard(const std::string& text);
-
-/// The shard that a cluster's launcher means for this process: a Slurm array task (SLURM_ARRAY_TASK_ID, _COUNT, _MIN,
-/// _STEP), else an Open MPI rank (OMPI_COMM_WORLD_RANK, _SIZE), else none. Both at once: rank within task.
-/// @param variable value of an environment variable, or null   @throws Error that names the variable
-std::optional<Shard> launcher_shard(const std::function<const char*(const char*)>& variable);
 
 }  // namespace medulla::tables

@@ -1,7 +1,9 @@
 // furtable plot and furtable export: pictures of lobes, and packs and tables in other programs' forms.
+#include <fcntl.h>
 #include <fmt/core.h>
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
@@ -11,6 +13,8 @@
 #include "tables/programs/commands.hpp"
 #include "tables/programs/plot.hpp"
 #include "tables/store/file.hpp"
+#include "tables/store/json_text.hpp"
+#include "tables/store/output.hpp"
 
 extern char** environ;  // POSIX
 
@@ -72,35 +76,64 @@ Panel panel_of(const std::vector<std::unique_ptr<Source>>& sources, const std::v
     return panel;
 }
 
-/// SVG -> PNG by librsvg's program, which draws SVG better than we would.
-void write_png(const std::string& output, const std::string& picture) {
-    PendingFile pending(output);
-    const std::string source = pending.temporary() + ".svg";
-    write_file(source, picture);
-    const std::vector<std::string> words = {"rsvg-convert", "--zoom", "2", "--output", pending.temporary(), source};
+/// A file's name as text of XML: no markup, no bytes that XML does not hold.
+std::string xml_name(const std::string& path) {
+    std::string text;
+    for (const char c : json_name(std::filesystem::path(path).filename().string()))
+        if (static_cast<unsigned char>(c) < ' ' || c == 127)
+            text += '?';
+        else if (c == '&' || c == '<' || c == '>')
+            text += c == '&' ? "&amp;" : (c == '<' ? "&lt;" : "&gt;");
+        else
+            text += c;
+    return text;
+}
+
+/// Runs a program without a shell, its messages unseen; whether it ended well.
+bool runs(const std::vector<std::string>& words) {
     std::vector<char*> arguments;
     for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
     pid_t child = 0;
-    int status = posix_spawnp(&child, "rsvg-convert", nullptr, nullptr, arguments.data(), environ);
+    int status = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
     if (status == 0 && waitpid(child, &status, 0) < 0) status = -1;
-    std::filesystem::remove(source);
-    if (status != 0)
+    return status == 0;
+}
+
+/// SVG -> PNG by librsvg's program, which draws SVG better than we would.
+std::vector<unsigned char> png(const std::string& picture, const std::string& output) {
+    std::string folder = (std::filesystem::temp_directory_path() / "furtable-XXXXXX").string();
+    if (::mkdtemp(folder.data()) == nullptr) throw Error("{}: cannot be made: {}", folder, std::strerror(errno));
+    const struct Removed {
+        std::string folder;
+        ~Removed() {
+            std::error_code ignored;
+            std::filesystem::remove_all(folder, ignored);
+        }
+    } removed{folder};
+    const std::string from = folder + "/picture.svg", to = folder + "/picture.png";
+    write_file(from, picture);
+    if (!runs({"rsvg-convert", "--zoom", "2", "--output", to, from}))
         throw Error("{}: rsvg-convert (package librsvg2-bin) could not draw it; .svg and .html need no such program",
                     output);
-    pending.commit();
+    return read_file(to);
 }
 
 void run_plot(const PlotWords& words) {
-    refuse_input(words.output, words.files);
     const std::string extension = std::filesystem::path(words.output).extension();
     if (extension != ".svg" && extension != ".png" && extension != ".html")
         throw UsageError("plot: -o expected a name that ends in .svg, .png or .html, found '{}'", words.output);
+    const Output output(words.output, words.files);
+    print_messages();
     std::vector<std::unique_ptr<Source>> sources;
     std::string title = "lobes of ";
     for (const std::string& file : words.files) {
         sources.push_back(open_source(file));
-        const std::string name = std::filesystem::path(file).filename();
+        const std::string name = xml_name(file);
         title += sources.size() == 1 ? name + " (colour)" : ", " + name + " (dashed)";
     }
     const double points[][2] = {{0.5, 0.3}, {2, 0.7}, {8, 0.9}};
@@ -112,14 +145,16 @@ void run_plot(const PlotWords& words) {
                     (absorption == 0 || (kind == TableKind::azimuthal && sources[0]->absorbs())))
                     panels.push_back(panel_of(sources, words.files, kind, point[0], point[1], absorption));
     const std::string picture = svg(title, panels, 3);
-    if (extension == ".png")
-        write_png(words.output, picture);
-    else if (extension == ".svg")
-        write_file(words.output, picture);
-    else
-        write_file(words.output, "<!DOCTYPE html>\n<html lang='en'><meta charset='utf-8'><title>" + title +
-                                     "</title>\n<body>\n" + picture + "</body></html>\n");
-    fmt::print("{} written\n", words.output);
+    if (extension == ".png") {
+        const std::vector<unsigned char> pixels = png(picture, words.output);
+        output.write(pixels.data(), pixels.size());
+    } else if (extension == ".svg") {
+        output.write(picture);
+    } else {
+        output.write("<!DOCTYPE html>\n<html lang='en'><meta charset='utf-8'><title>" + title + "</title>\n<body>\n" +
+                     picture + "</body></html>\n");
+    }
+    print("{} written\n", words.output);
 }
 
 // --- export ------------------------------------------------------------------------------------------------------
@@ -128,24 +163,30 @@ struct ExportWords {
     std::string file, format, output, table = "azimuthal", name = "fur_pack";
 };
 
-/// A C++ header that holds the pack's bytes as NAME_words, NAME_size: what runtime/include/medulla/default_pack.hpp is
-/// made with.
+/// A C++ header that holds the pack's bytes as medulla::NAME_words, NAME_size: what medulla/default_pack.hpp is made
+/// with. Its namespace and its guard carry the pack's checksum: one pack twice is there once, and two packs of one name
+/// are two for the linker.
 std::string cpp_header(const std::string& file, const std::string& name) {
     std::vector<unsigned char> bytes = read_pack(file);
+    const std::string mark = fmt::format("{:016x}", pack_checksum(bytes.data(), bytes.size()));
     const std::size_t size = bytes.size();
     bytes.resize((size + 7) / 8 * 8, 0);
-    std::string out =
+    std::string out = fmt::format(
         "// Generated by `furtable export PACK --format cpp`; do not edit.\n"
-        "#pragma once\n\n#include <cstddef>\n#include <cstdint>\n\nnamespace medulla {\n\n";
-    out += fmt::format("inline constexpr std::size_t {}_size = {};\n", name, size);
-    out += fmt::format("// clang-format off\nalignas(16) inline constexpr std::uint64_t {}_words[{}] = {{", name,
-                       bytes.size() / 8);
+        "#pragma once\n\n#include <cstddef>\n#include <cstdint>\n\n"
+        "#ifndef MEDULLA_PACK_{0}_{1}\n#define MEDULLA_PACK_{0}_{1}\n\n"
+        "namespace medulla {{\ninline namespace pack_{1} {{\n\n"
+        "inline constexpr std::size_t {0}_size = {2};\n"
+        "// clang-format off\nalignas(16) inline constexpr std::uint64_t {0}_words[{3}] = {{",
+        name, mark, size, bytes.size() / 8);
     for (std::size_t i = 0; i < bytes.size(); i += 8) {
         std::uint64_t word = 0;  // the pack is little-endian, and so must the machine be that uses these words
         for (std::size_t b = 8; b-- > 0;) word = word << 8 | bytes[i + b];
         out += fmt::format("{}0x{:x},", i % 64 == 0 ? "\n" : "", word);
     }
-    return out + "\n};\n// clang-format on\n\n}  // namespace medulla\n";
+    return out +
+           fmt::format("\n}};\n// clang-format on\n\n}}  // namespace pack_{}\n}}  // namespace medulla\n\n#endif\n",
+                       mark);
 }
 
 /// numpy's .npy, version 1.0: the normalised lobes on the table's own axes, float32.
@@ -187,10 +228,7 @@ std::string npy(const std::string& file, const std::string& name) {
     return out;
 }
 
-/// Names that begin with gl_ or hold two underscores are GLSL's own.
 std::string glsl(const std::string& file, const std::string& name) {
-    if (name.rfind("gl_", 0) == 0 || name.find("__") != std::string::npos || name.back() == '_')
-        throw UsageError("--name: expected no gl_ in front, no two underscores and none at the end, found '{}'", name);
     const std::vector<unsigned char> bytes = read_pack(file);
     try {
         return glsl_source(bytes, name);
@@ -199,15 +237,27 @@ std::string glsl(const std::string& file, const std::string& name) {
     }
 }
 
+/// What names are made of is followed by _words, _size, _azimuthal ..: no keyword, but what the languages keep for
+/// themselves.
+void check_name_of(const std::string& format, const std::string& name) {
+    const bool reserved = name.find("__") != std::string::npos || name.back() == '_';
+    if (format == "glsl" && (reserved || name.rfind("gl_", 0) == 0))
+        throw UsageError("--name: expected no gl_ in front, no two underscores and none at the end, found '{}'", name);
+    if (format == "cpp" && (reserved || name[0] == '_'))
+        throw UsageError("--name: expected no two underscores, none in front and none at the end, found '{}'", name);
+}
+
 void run_export(const ExportWords& words) {
-    refuse_input(words.output, {words.file});
+    check_name_of(words.format, words.name);
+    const Output output(words.output, {words.file});
+    print_messages();
     if (words.format == "npy")
-        write_file(words.output, npy(words.file, words.table));
+        output.write(npy(words.file, words.table));
     else if (words.format == "cpp")
-        write_file(words.output, cpp_header(words.file, words.name));
+        output.write(cpp_header(words.file, words.name));
     else
-        write_file(words.output, glsl(words.file, words.name));
-    fmt::print("{} written\n", words.output);
+        output.write(glsl(words.file, words.name));
+    print("{} written\n", words.output);
 }
 
 }  // namespace

@@ -15,6 +15,9 @@ namespace medulla::tables {
 enum class TableName : std::uint32_t { azimuthal = 0, longitudinal = 1 };
 const char* name_of(TableName table);
 
+/// Most numbers in the lobes of one slice, which is one chunk of the tables file.
+inline constexpr std::size_t most_slice_values = 4096 * 4096;
+
 /// Place of a slice: indices into the table's sigma and g axes.
 struct SliceId {
     TableName table = TableName::azimuthal;

@@ -1,4 +1,4 @@
-// furtable bcsdf and furtable presets: the fur model by hand, lobe by lobe.
+// furtable bcsdf and furtable presets: evaluates the fur model lobe by lobe.
 #include <fmt/format.h>
 
 #include "medulla/medulla.hpp"
@@ -10,24 +10,24 @@
 namespace medulla::tables {
 namespace {
 
-struct BcsdfWords {
+struct BcsdfArguments {
     std::string preset, material, range, pack = "default";
     double theta_i = 0, theta_r = 0, phi = 0, h = 0;
     bool far = false, json = false;
     const CLI::Option* h_given = nullptr;
 };
 
-OffsetRange range_of(const BcsdfWords& words) {
-    if (words.far) return {-1, 1};
-    if (*words.h_given) {
-        if (!(words.h >= -1 && words.h <= 1)) throw UsageError("--h: expected a value in [-1, 1], found {:g}", words.h);
-        return {static_cast<float>(words.h), static_cast<float>(words.h)};
+OffsetRange range_of(const BcsdfArguments& args) {
+    if (args.far) return {-1, 1};
+    if (*args.h_given) {
+        if (!(args.h >= -1 && args.h <= 1)) throw UsageError("--h: expected a value in [-1, 1], found {:g}", args.h);
+        return {static_cast<float>(args.h), static_cast<float>(args.h)};
     }
-    const std::size_t colon = std::min(words.range.find(':'), words.range.size() - 1);
-    const auto low = parse_number<double>(words.range.substr(0, colon)),
-               high = parse_number<double>(words.range.substr(colon + 1));
+    const std::size_t colon = std::min(args.range.find(':'), args.range.size() - 1);
+    const auto low = parse_number<double>(args.range.substr(0, colon)),
+               high = parse_number<double>(args.range.substr(colon + 1));
     if (!low || !high || !(-1 <= *low && *low <= *high && *high <= 1))
-        throw UsageError("--h-range: expected A:B with -1 <= A <= B <= 1, found '{}'", words.range);
+        throw UsageError("--h-range: expected A:B with -1 <= A <= B <= 1, found '{}'", args.range);
     return {static_cast<float>(*low), static_cast<float>(*high)};
 }
 
@@ -37,65 +37,66 @@ nlohmann::ordered_json colour(const double (&value)[3], bool grey) {
     return {value[0], value[1], value[2]};
 }
 
-/// Says where the pack's axes end before what the fibre asks of them: there the runtime holds to the end.
+/// Warns if the fibre's parameters are outside the pack's axes, where the runtime clamps them.
 void warn_beyond_axes(const FurFibre<3>& fibre, const Longitudinal<3>& at, double offset, const Source& pack,
                       const std::string& path) {
     if (!fibre.scattered) return;
-    Parameters asked;
-    asked.sigma = static_cast<double>(at.sigma), asked.g = static_cast<double>(fibre.parameters.g);
-    asked.theta_i = std::abs(static_cast<double>(at.theta_i));
-    asked.h = offset * static_cast<double>(at.at.inverse_index) / static_cast<double>(fibre.parameters.kappa);
-    asked.h = std::min(asked.h, 1.0);  // beyond, light passes the medulla by
-    if (pack.absorbs()) asked.absorption = static_cast<double>(at.absorbed);
+    Parameters wanted;
+    wanted.sigma = static_cast<double>(at.sigma), wanted.g = static_cast<double>(fibre.parameters.g);
+    wanted.theta_i = std::abs(static_cast<double>(at.theta_i));
+    wanted.h = offset * static_cast<double>(at.at.inverse_index) / static_cast<double>(fibre.parameters.kappa);
+    wanted.h = std::min(wanted.h, 1.0);  // beyond, light misses the medulla
+    if (pack.absorbs()) wanted.absorption = static_cast<double>(at.absorbed);
     std::string beyond;
     for (const TableKind kind : lobe_kinds) {
-        const std::string one = pack.beyond(kind, asked);
+        const std::string one = pack.beyond(kind, wanted);
         if (beyond.find(one) == std::string::npos) beyond += (beyond.empty() ? "" : "; ") + one;
     }
     if (!beyond.empty())
-        say("furtable", fmt::format("warning: {}: {}: TTs and TRTs are those of the axis's end", path, beyond));
+        say("furtable",
+            fmt::format("warning: {}: {}: TTs and TRTs are evaluated at the end of the axis", path, beyond));
 }
 
-void run_bcsdf(const BcsdfWords& words) {
+void run_bcsdf(const BcsdfArguments& args) {
     const auto check = [](const char* name, double degrees, const char* range) {
         if (!(degrees >= -90 && degrees <= 90))
             throw UsageError("{}: expected degrees in {}, found {}", name, range, degrees);
     };
-    check("--theta-i", words.theta_i, "(-90, 90)"), check("--theta-r", words.theta_r, "[-90, 90]");
-    const double phi = std::remainder(words.phi, 360.0);
-    const OffsetRange range = range_of(words);
+    check("--theta-i", args.theta_i, "(-90, 90)"), check("--theta-r", args.theta_r, "[-90, 90]");
+    const double phi = std::remainder(args.phi, 360.0);
+    const OffsetRange range = range_of(args);
     Material material;
-    if (words.material.empty()) {
+    if (args.material.empty()) {
         try {
-            material = preset_material(words.preset, "--preset");
+            material = preset_material(args.preset, "--preset");
         } catch (const Error& error) {
             throw UsageError("{}", error.what());
         }
     } else {
-        material = read_material(words.material);
+        material = read_material(args.material);
     }
-    const std::vector<unsigned char> bytes = read_pack(words.pack);
+    const std::vector<unsigned char> bytes = read_pack(args.pack);
     const PackView pack = open_pack(bytes.data(), bytes.size()).pack;
     FurFibre<3> fibre;
     if (const FurStatus status = prepare(material.fur, pack, fibre); status != FurStatus::ok)
-        throw Error("{}: {}", words.pack, describe(status));
+        throw Error("{}: {}", args.pack, describe(status));
 
-    const double radians = pi / 180, theta_i = words.theta_i * radians;
+    const double radians = pi / 180, theta_i = args.theta_i * radians;
     FarField<3> field;
     far_field(fibre, static_cast<float>(theta_i), range, field);
     if (!field.valid)
         throw UsageError(
             "--theta-i: expected degrees within (-90, 90), since light along the fibre meets no section, found {}",
-            words.theta_i);
+            args.theta_i);
     warn_beyond_axes(fibre, field.near.longitudinal,
                      static_cast<double>(std::max(std::abs(range.low), std::abs(range.high))),
-                     *pack_source(bytes, words.pack), words.pack);
+                     *pack_source(bytes, args.pack), args.pack);
     const LobeValues<3> lobes =
-        field.lobes(static_cast<float>(words.theta_r * radians), static_cast<float>(phi * radians));
+        field.lobes(static_cast<float>(args.theta_r * radians), static_cast<float>(phi * radians));
     const double cosine = std::cos(theta_i);
     nlohmann::ordered_json json;
     double sum[3] = {};
-    if (!words.json)
+    if (!args.json)
         print("{:<5} {:>12}  {:>12}  {:>12}\n", "lobe", "M [1/rad]", "N [1/rad]", "M N / cos^2 theta_i [1/rad^2]");
     for (int lobe = 0; lobe < lobe_count; ++lobe) {
         double N[3], value[3];
@@ -106,28 +107,28 @@ void run_bcsdf(const BcsdfWords& words) {
         }
         json["lobes"][lobe_names[lobe]] = {
             {"M", lobes.M[lobe]}, {"N", colour(N, material.grey)}, {"value", colour(value, material.grey)}};
-        for (int c = 0; c < (material.grey ? 1 : 3) && !words.json; ++c)
+        for (int c = 0; c < (material.grey ? 1 : 3) && !args.json; ++c)
             print("{:<5} {:>12.6g}  {:>12.6g}  {:>12.6g}\n", c == 0 ? lobe_names[lobe] : "",
                   static_cast<double>(lobes.M[lobe]), N[c], value[c]);
     }
     json["sum"] = colour(sum, material.grey);
-    if (words.json)
+    if (args.json)
         print("{}\n", json_line(json));
     else
         print_text(fmt::format("sum   {:.6g}\n", fmt::join(sum, sum + (material.grey ? 1 : 3), "  ")));
 }
 
-struct PresetWords {
+struct PresetArguments {
     bool json = false;
 };
 
-/// The number that is printed: 0.88 rather than the float next to it.
+/// The printed decimal number: 0.88, not the nearest float.
 double as_printed(float x) { return std::stod(fmt::format("{}", x)); }
 
-void run_presets(const PresetWords& words) {
+void run_presets(const PresetArguments& args) {
     nlohmann::ordered_json json = nlohmann::ordered_json::array();
     constexpr const char* line = "{:<10} {:>6} {:>6} {:>6} {:>7} {:>7} {:>8} {:>8} {:>8} {:>5} {:>6}\n";
-    if (!words.json) {
+    if (!args.json) {
         print(line, "name", "kappa", "eta", "alpha", "beta_m", "beta_n", "sigma_ca", "sigma_ms", "sigma_ma", "g",
               "layers");
         // Sigmas are per fibre radius.
@@ -145,45 +146,47 @@ void run_presets(const PresetWords& words) {
                         {"sigma_ma", as_printed(p.sigma_ma)},
                         {"g", as_printed(p.g)},
                         {"layers", as_printed(p.layers)}});
-        if (!words.json)
+        if (!args.json)
             print(line, p.name, p.kappa, p.eta, p.alpha, p.beta_m, p.beta_n, p.sigma_ca, p.sigma_ms, p.sigma_ma, p.g,
                   p.layers);
     }
-    if (words.json) print("{}\n", json_line(nlohmann::ordered_json{{"presets", json}}));
+    if (args.json) print("{}\n", json_line(nlohmann::ordered_json{{"presets", json}}));
 }
 
 }  // namespace
 
 void add_bcsdf(CLI::App& app, Action& action) {
-    add_command<BcsdfWords>(
+    add_command<BcsdfArguments>(
         app, action, "bcsdf", "the fur model lobe by lobe: M, N, M N / cos^2 theta_i",
-        [](CLI::App& command, BcsdfWords& words) {
+        [](CLI::App& command, BcsdfArguments& args) {
             auto* which = command.add_option_group("material")->require_option(1);
-            which->add_option("--preset", words.preset, "animal of Table 4 (furtable presets)");
-            which->add_option("--material", words.material, "JSON file of one material");
-            add_number(command, "--theta-i", words.theta_i, "inclination of the light, degrees in (-90, 90)")
+            which->add_option("--preset", args.preset, "animal of Table 4 (furtable presets)");
+            which->add_option("--material", args.material, "JSON file of one material");
+            add_number(command, "--theta-i", args.theta_i, "inclination of the light, degrees in (-90, 90)")
                 ->required();
-            add_number(command, "--theta-r", words.theta_r, "inclination of exit, degrees in [-90, 90]")->required();
-            add_number(command, "--phi", words.phi,
-                       "azimuth of exit less that of the light, degrees; 0 = back, whole turns count for nothing")
+            add_number(command, "--theta-r", args.theta_r, "inclination of exit, degrees in [-90, 90]")->required();
+            add_number(command, "--phi", args.phi,
+                       "azimuth of exit minus that of the light, degrees, modulo 360; 0 = back")
                 ->required();
             auto* where = command.add_option_group("offset")->require_option(1);
-            words.h_given = add_number(*where, "--h", words.h, "near field: one offset in [-1, 1]");
-            where->add_option("--h-range", words.range, "mean over offsets A:B");
-            where->add_flag("--far", words.far, "far field: mean over -1:1");
+            args.h_given = add_number(*where, "--h", args.h, "near field: one offset in [-1, 1]");
+            where->add_option("--h-range", args.range, "mean over offsets A:B");
+            where->add_flag("--far", args.far, "far field: mean over -1:1");
             command
-                .add_option("--pack", words.pack,
-                            "tables of the scattered lobes; beyond its axes their ends hold, and a warning says so")
+                .add_option("--pack", args.pack,
+                            "tables of the scattered lobes; parameters outside its axes are clamped, with a warning")
                 ->capture_default_str();
-            command.add_flag("--json", words.json, "print one JSON object");
+            command.add_flag("--json", args.json, "print one JSON object");
         },
         run_bcsdf);
 }
 
 void add_presets(CLI::App& app, Action& action) {
-    add_command<PresetWords>(
+    add_command<PresetArguments>(
         app, action, "presets", "the animals of Table 4 (angles in degrees, sigma per fibre radius)",
-        [](CLI::App& command, PresetWords& words) { command.add_flag("--json", words.json, "print one JSON object"); },
+        [](CLI::App& command, PresetArguments& args) {
+            command.add_flag("--json", args.json, "print one JSON object");
+        },
         run_presets);
 }
 

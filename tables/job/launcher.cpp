@@ -58,7 +58,7 @@ std::optional<Launched> array_task(const Variables& variable) {
                         least = number(variable, "SLURM_ARRAY_TASK_MIN", 0),
                         step = number(variable, "SLURM_ARRAY_TASK_STEP", 1);
     const std::uint32_t index = step > 0 && id >= least ? (id - least) / step : count;
-    if (count < 1 || count > most_shards || index >= count || (id - least) % step != 0)
+    if (count < 1 || count > most_workers || index >= count || (id - least) % step != 0)
         throw Error("SLURM_ARRAY_TASK_ID: expected a task of an even array (--array=1-N), found task {} of {} from {}",
                     id, count, least);
     return Launched{{index + 1, count}, "SLURM_ARRAY_TASK_ID and SLURM_ARRAY_TASK_COUNT"};
@@ -74,9 +74,9 @@ std::optional<Launched> rank(const Variables& variable) {
             throw Error("{}: expected the number of ranks beside it in {}, found none; say --shard I/N or --shard none",
                         launcher.rank, launcher.sizes[0]);
         const std::uint32_t index = number(variable, launcher.rank), size = number(variable, size_name);
-        if (index >= size || size > most_shards)
+        if (index >= size || size > most_workers)
             throw Error("{}: expected a rank below {} ({}, at most {}), found {}", launcher.rank, size, size_name,
-                        most_shards, index);
+                        most_workers, index);
         return Launched{{index + 1, size}, fmt::format("{} and {}", launcher.rank, size_name)};
     }
     return std::nullopt;
@@ -88,14 +88,14 @@ std::optional<Launched> launched(const Variables& variable) {
     std::optional<Launched> task = array_task(variable), inner = rank(variable);
     if (!task || !inner) {
         std::optional<Launched>& one = task ? task : inner;
-        if (one && one->shard.count == 1) one.reset();
+        if (one && one->share.count == 1) one.reset();
         return one;
     }
-    const std::uint32_t tasks = task->shard.count, ranks = inner->shard.count;
-    if (std::uint64_t{tasks} * ranks > most_shards)
-        throw Error("{}: expected at most {} workers in all, found {} x {}", inner->from, most_shards, tasks, ranks);
+    const std::uint32_t tasks = task->share.count, ranks = inner->share.count;
+    if (std::uint64_t{tasks} * ranks > most_workers)
+        throw Error("{}: expected at most {} workers in all, found {} x {}", inner->from, most_workers, tasks, ranks);
     if (tasks * ranks == 1) return std::nullopt;
-    return Launched{{(task->shard.index - 1) * ranks + inner->shard.index, tasks * ranks},
+    return Launched{{(task->share.index - 1) * ranks + inner->share.index, tasks * ranks},
                     task->from + ", " + inner->from};
 }
 

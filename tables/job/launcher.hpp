@@ -5,12 +5,12 @@
 #include <optional>
 #include <string>
 
-#include "tables/job/schedule.hpp"
+#include "tables/job/worker_share.hpp"
 
 namespace medulla::tables {
 
 struct Launched {
-    Shard shard;
+    WorkerShare share;
     std::string from;  ///< "PMI_RANK and PMI_SIZE"
 };
 

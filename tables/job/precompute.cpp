@@ -72,7 +72,7 @@ std::optional<Tables> finished(const Job& job, const Tables& plan) {
 }
 
 /// A kept slice; what it took is not known, what it should have taken is.
-Refinable refinable(const Request& request, const ShardFolder& folder, const SliceId& id) {
+Refinable refinable(const Request& request, const SliceFolder& folder, const SliceId& id) {
     std::string why;
     const std::optional<Slice> slice = folder.read(id, why);
     if (!slice) throw Error("{}: damaged: {}", folder.file_of(id), why);
@@ -80,14 +80,14 @@ Refinable refinable(const Request& request, const ShardFolder& folder, const Sli
 }
 
 /// Solves what `slices` misses and keeps it; with a time budget coarsely first, then where error falls most.
-void solve(const Job& job, const SliceSolver& solver, const ShardFolder& folder, const std::vector<SliceId>& slices,
+void solve(const Job& job, const SliceSolver& solver, const SliceFolder& folder, const std::vector<SliceId>& slices,
            const std::vector<bool>& kept) {
     const double start = omp_get_wtime(), budget = job.request.time_budget;
     std::vector<SliceId> missing;
     std::vector<Refinable> coarse;
     std::size_t cells = 0, done = 0;
     for (std::size_t i = 0; i < slices.size(); ++i) {
-        const std::size_t count = slice_cells(table_of(solver.plan(), slices[i].table));
+        const std::size_t count = slice_cells(solver.plan().at(slices[i].table));
         cells += count;
         if (!kept[i]) {
             missing.push_back(slices[i]);
@@ -114,13 +114,13 @@ void solve(const Job& job, const SliceSolver& solver, const ShardFolder& folder,
            [&](const SliceId& id, const Slice& slice) { folder.write(id, slice); });
 }
 
-std::size_t count_kept(const ShardFolder& folder, const std::vector<SliceId>& slices) {
+std::size_t count_kept(const SliceFolder& folder, const std::vector<SliceId>& slices) {
     std::size_t count = 0;
     for (const SliceId& id : slices) count += std::filesystem::exists(folder.file_of(id));
     return count;
 }
 
-void interrupted_if_asked(const ShardFolder& folder, const std::vector<SliceId>& slices) {
+void interrupted_if_asked(const SliceFolder& folder, const std::vector<SliceId>& slices) {
     if (stop)
         throw Interrupted(caught, "interrupted: {} of {} slices kept in {}; go on with --resume",
                           count_kept(folder, slices), slices.size(), folder.path());
@@ -128,7 +128,7 @@ void interrupted_if_asked(const ShardFolder& folder, const std::vector<SliceId>&
 
 }  // namespace
 
-Tables assemble(const ShardFolder& folder, const Tables& plan) {
+Tables assemble(const SliceFolder& folder, const Tables& plan) {
     Tables tables = plan;
     for (auto* table : {&tables.azimuthal, &tables.longitudinal})
         if (*table) (*table)->allocate();
@@ -145,38 +145,38 @@ JobReport run_job(const Job& job) {
     const Interrupts interrupts;
     const Output output(job.output, job.inputs);
     output.require_plain();  // slices are kept beside it
-    check_name(ShardFolder::beside(job.output));
+    check_name(SliceFolder::beside(job.output));
     const SliceSolver solver(job.request);
     const Tables& plan = solver.plan();
-    ShardFolder folder(ShardFolder::beside(job.output), plan);
+    SliceFolder folder(SliceFolder::beside(job.output), plan);
     JobReport report;
-    report.shards = folder.path();
+    report.folder = folder.path();
     const std::vector<SliceId> all = slices_of(plan);
-    const std::vector<SliceId> slices = job.shard ? share_of(job.request, all, *job.shard) : by_cost(job.request, all);
+    const std::vector<SliceId> slices = job.share ? share_of(job.request, all, *job.share) : by_cost(job.request, all);
     report.slices = slices.size();
     if (job.resume)
         if (auto tables = finished(job, plan)) {
             report.tables = std::move(*tables);
             report.was_complete = true;
             report.kept = slices.size();
-            if (!job.shard && std::filesystem::exists(folder.path())) {  // killed between the last two steps
+            if (!job.share && std::filesystem::exists(folder.path())) {  // killed between the last two steps
                 folder.open(true);
                 folder.remove();
             }
             return report;
         }
-    if (!job.resume && !job.shard && !folder.files().empty())
+    if (!job.resume && !job.share && !folder.files().empty())
         throw Error("{}: holds slices of an earlier run; go on with --resume, or delete it", folder.path());
-    folder.open(!job.shard);
+    folder.open(!job.share);
     try {
         const std::vector<bool> kept = folder.kept(slices);
         report.kept = static_cast<std::size_t>(std::count(kept.begin(), kept.end(), true));
-        if (job.shard && !job.resume && report.kept > 0)
+        if (job.share && !job.resume && report.kept > 0)
             throw Error("{}: holds {} of this worker's {} slices already; go on with --resume, or delete it",
                         folder.path(), report.kept, slices.size());
         solve(job, solver, folder, slices, kept);
         interrupted_if_asked(folder, slices);
-        if (job.shard) {
+        if (job.share) {
             report.tables = plan;
             return report;
         }
@@ -188,7 +188,7 @@ JobReport run_job(const Job& job) {
     } catch (const Error& error) {
         const std::size_t count = count_kept(folder, slices);
         folder.remove_if_empty();
-        if (count == 0 || job.shard) throw;
+        if (count == 0 || job.share) throw;
         throw Error("{}; {} of {} slices kept in {}, go on with --resume", error.what(), count, slices.size(),
                     folder.path());
     }

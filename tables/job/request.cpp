@@ -14,17 +14,8 @@ Method method_of(const std::string& name) {
 }
 
 const char* name_of(Method method) {
-    switch (method) {
-        case Method::automatic:
-            return "auto";
-        case Method::analog:
-            return "analog";
-        case Method::mc:
-            return "mc";
-        case Method::deterministic:
-            return "deterministic";
-    }
-    return "?";
+    constexpr const char* names[] = {"auto", "analog", "mc", "deterministic"};
+    return names[static_cast<std::size_t>(method)];
 }
 
 Request default_request() {

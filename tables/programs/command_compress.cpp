@@ -54,13 +54,11 @@ Tables read_all(const std::vector<std::string>& files) {
     Tables all = read_tables(files[0]);
     for (std::size_t i = 1; i < files.size(); ++i) {
         Tables more = read_tables(files[i]);
-        for (const auto& [mine, other] :
-             {std::pair(&all.azimuthal, &more.azimuthal), std::pair(&all.longitudinal, &more.longitudinal)}) {
-            if (!*other) continue;
-            if (*mine)
-                throw Error("{}: expected another table than {}, found /{} in both", files[i], files[0],
-                            (*other)->name);
-            *mine = std::move(*other);
+        for (const TableId id : table_ids) {
+            if (!more[id]) continue;
+            if (all[id])
+                throw Error("{}: expected another table than {}, found /{} in both", files[i], files[0], name_of(id));
+            all[id] = std::move(more[id]);
         }
     }
     return all;

@@ -39,7 +39,7 @@ nlohmann::ordered_json info(const std::string& path) {
         json["sha256"] = hex(contents_hash(tables));
         json["configuration"] = hex(configuration_hash(tables));
         for (const Table* table : tables.present()) {
-            nlohmann::ordered_json& out = json["tables"][table->name];
+            nlohmann::ordered_json& out = json["tables"][table->name()];
             out["method"] = table->method;
             out["seed"] = table->seed;
             out["paths"] = table->paths;
@@ -145,7 +145,7 @@ double asymmetry(const std::vector<double>& lobe) {
 
 /// What a table promises beyond what reading it checks: mirror-symmetric lobes where the light is head-on.
 void verify_table(const Table& table, const std::string& path) {
-    const char* offset = table.name == "longitudinal" ? "theta_i" : "h";
+    const char* offset = table.id == TableId::longitudinal ? "theta_i" : "h";
     for (std::size_t cell = 0; cell < table.cells(); ++cell) {
         if (table.parameter(cell, offset) != 0) continue;
         const double noise = table.standard_error[cell];
@@ -153,7 +153,7 @@ void verify_table(const Table& table, const std::string& path) {
         if (found > 5 * std::sqrt(2.0) * noise + 1e-6)
             throw Error(
                 "{}: /{}: {}: expected a mirror-symmetric lobe, found asymmetry {:.2e} at standard error {:.2e}", path,
-                table.name, table.describe(cell), found, noise);
+                table.name(), table.describe(cell), found, noise);
     }
 }
 

@@ -1,159 +1,44 @@
 // furtable plot and furtable export: pictures of lobes, and packs and tables in other programs' forms.
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
-#include <filesystem>
+#include <optional>
 
+#include "plot/gnuplot.hpp"
 #include "tables/pack/glsl.hpp"
 #include "tables/programs/commands.hpp"
-#include "tables/programs/plot.hpp"
-#include "tables/store/file.hpp"
-#include "tables/store/json_text.hpp"
+#include "tables/programs/lobe_figure.hpp"
+#include "tables/programs/number.hpp"
 #include "tables/store/output.hpp"
-
-extern char** environ;  // POSIX
 
 namespace medulla::tables {
 namespace {
 
 struct PlotWords {
-    std::vector<std::string> files;
+    std::vector<std::string> files, at;
     std::string output;
 };
 
-/// Value of an axis nearest to `wanted`.
-double nearest(const std::vector<Axis>& axes, const std::string& name, double wanted) {
-    for (const Axis& axis : axes) {
-        if (axis.name != name) continue;
-        double best = axis.values[0];
-        for (const double x : axis.values)
-            if (std::abs(x - wanted) < std::abs(best - wanted)) best = x;
-        return best;
-    }
-    return 0;
-}
-
-/// One panel: lobes of every file at three offsets or inclinations of one (sigma, g) and, where there is such an axis,
-/// absorption.
-Panel panel_of(const std::vector<std::unique_ptr<Source>>& sources, const std::vector<std::string>& names,
-               TableKind kind, double sigma, double g, double absorption) {
-    constexpr const char* colours[] = {"#1f4e9c", "#c2571a", "#2c8a4b"};
-    const std::vector<Axis> axes = sources[0]->parameter_axes(kind);
-    const bool azimuthal = kind == TableKind::azimuthal;
-    Parameters at;
-    at.sigma = nearest(axes, "sigma", sigma), at.g = nearest(axes, "g", g);
-    at.absorption = nearest(axes, "absorption", absorption);
-    Panel panel;
-    panel.title = fmt::format("{}, σ {:.3g}, g {:.2g}", name_of(kind), at.sigma, at.g);
-    if (azimuthal && sources[0]->absorbs()) panel.title += fmt::format(", σa {:.2g}", at.absorption);
-    panel.x_label = azimuthal ? "φ [degrees]" : "θr [degrees]";
-    const double positions[] = {0, azimuthal ? 0.6 : pi / 6, azimuthal ? 0.95 : pi / 3};
-    for (std::size_t p = 0; p < 3; ++p) {
-        if (azimuthal)
-            at.h = nearest(axes, "h", positions[p]);
-        else
-            at.theta_i = nearest(axes, "theta_i", positions[p]);
-        for (std::size_t s = 0; s < sources.size(); ++s) {
-            if (!sources[s]->has(kind) || (at.absorption != 0 && !sources[s]->absorbs())) continue;
-            sources[s]->check(kind, at, names[s]);
-            Curve curve;
-            const std::size_t bins = sources[s]->bins(kind);
-            if (s == 0)
-                curve.label =
-                    azimuthal ? fmt::format("h {:.2g}", at.h) : fmt::format("θi {:.0f}°", at.theta_i * 180 / pi);
-            curve.colour = s == 0 ? colours[p] : "#000";
-            curve.dashed = s > 0;
-            curve.x = exit_axis(exit_name(kind), bins).values;
-            curve.y = sources[s]->lobe(kind, at, bins);
-            panel.curves.push_back(std::move(curve));
-        }
-    }
-    return panel;
-}
-
-/// A file's name as text of XML: no markup, no bytes that XML does not hold.
-std::string xml_name(const std::string& path) {
-    std::string text;
-    for (const char c : json_name(std::filesystem::path(path).filename().string()))
-        if (static_cast<unsigned char>(c) < ' ' || c == 127)
-            text += '?';
-        else if (c == '&' || c == '<' || c == '>')
-            text += c == '&' ? "&amp;" : (c == '<' ? "&lt;" : "&gt;");
-        else
-            text += c;
-    return text;
-}
-
-/// Runs a program without a shell, its messages unseen; whether it ended well.
-bool runs(const std::vector<std::string>& words) {
-    std::vector<char*> arguments;
-    for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
-    arguments.push_back(nullptr);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-    pid_t child = 0;
-    int status = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    if (status == 0 && waitpid(child, &status, 0) < 0) status = -1;
-    return status == 0;
-}
-
-/// SVG -> PNG by librsvg's program, which draws SVG better than we would.
-std::vector<unsigned char> png(const std::string& picture, const std::string& output) {
-    std::string folder = (std::filesystem::temp_directory_path() / "furtable-XXXXXX").string();
-    if (::mkdtemp(folder.data()) == nullptr) throw Error("{}: cannot be made: {}", folder, std::strerror(errno));
-    const struct Removed {
-        std::string folder;
-        ~Removed() {
-            std::error_code ignored;
-            std::filesystem::remove_all(folder, ignored);
-        }
-    } removed{folder};
-    const std::string from = folder + "/picture.svg", to = folder + "/picture.png";
-    write_file(from, picture);
-    if (!runs({"rsvg-convert", "--zoom", "2", "--output", to, from}))
-        throw Error("{}: rsvg-convert (package librsvg2-bin) could not draw it; .svg and .html need no such program",
-                    output);
-    return read_file(to);
+/// "SIGMA:G", or what is wrong with it.
+PlotPoint plot_point(const std::string& text) {
+    const std::size_t colon = std::min(text.find(':'), text.size() - 1);
+    const auto sigma = parse_number<double>(text.substr(0, colon)), g = parse_number<double>(text.substr(colon + 1));
+    if (!sigma || !g) throw UsageError("plot: --at expected SIGMA:G, such as 2:0.7, found '{}'", text);
+    return {*sigma, *g};
 }
 
 void run_plot(const PlotWords& words) {
-    const std::string extension = std::filesystem::path(words.output).extension();
-    if (extension != ".svg" && extension != ".png" && extension != ".html")
+    const std::optional<plot::Format> format = plot::format_of(words.output);
+    if (!format)
         throw UsageError("plot: -o expected a name that ends in .svg, .png or .html, found '{}'", words.output);
     const Output output(words.output, words.files);
     print_messages();
+    std::vector<PlotPoint> points;
+    for (const std::string& text : words.at) points.push_back(plot_point(text));
     std::vector<std::unique_ptr<Source>> sources;
-    std::string title = "lobes of ";
-    for (const std::string& file : words.files) {
-        sources.push_back(open_source(file));
-        const std::string name = xml_name(file);
-        title += sources.size() == 1 ? name + " (colour)" : ", " + name + " (dashed)";
-    }
-    const double points[][2] = {{0.5, 0.3}, {2, 0.7}, {8, 0.9}};
-    std::vector<Panel> panels;
-    for (const TableKind kind : lobe_kinds)
-        for (const double absorption : {0, 1})
-            for (const auto& point : points)
-                if (sources[0]->has(kind) &&
-                    (absorption == 0 || (kind == TableKind::azimuthal && sources[0]->absorbs())))
-                    panels.push_back(panel_of(sources, words.files, kind, point[0], point[1], absorption));
-    const std::string picture = svg(title, panels, 3);
-    if (extension == ".png") {
-        const std::vector<unsigned char> pixels = png(picture, words.output);
-        output.write(pixels.data(), pixels.size());
-    } else if (extension == ".svg") {
-        output.write(picture);
-    } else {
-        output.write("<!DOCTYPE html>\n<html lang='en'><meta charset='utf-8'><title>" + title + "</title>\n<body>\n" +
-                     picture + "</body></html>\n");
-    }
+    for (const std::string& file : words.files) sources.push_back(open_source(file));
+    output.write(plot::draw(lobe_figure(sources, words.files, points), *format));
     print("{} written\n", words.output);
 }
 
@@ -264,10 +149,13 @@ void run_export(const ExportWords& words) {
 
 void add_plot(CLI::App& app, Action& action) {
     add_command<PlotWords>(
-        app, action, "plot", "pictures of lobes; further files are drawn dashed over the first",
+        app, action, "plot", "draws lobes with gnuplot; further files dashed over the first, their errors below",
         [](CLI::App& command, PlotWords& words) {
             command.add_option("FILE", words.files, "tables files or packs")->required();
             command.add_option("-o,--output", words.output, "picture: .svg, .png or .html")->required();
+            command
+                .add_option("--at", words.at, "SIGMA:G of each column; the nearest nodes of the first file are drawn")
+                ->default_val(std::vector<std::string>{"0.5:0.3", "2:0.7", "8:0.9"});
         },
         run_plot);
 }

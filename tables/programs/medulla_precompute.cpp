@@ -82,15 +82,15 @@ Compression compression_of(const std::string& name) {
 }
 
 /// What --shard says; `auto` asks the launcher's environment, and says what it found.
-std::optional<Shard> shard_of(const std::string& words) {
+std::optional<WorkerShare> share_named(const std::string& words) {
     try {
         if (words == "none") return std::nullopt;
-        if (words != "auto") return parse_shard(words);
+        if (words != "auto") return parse_worker_share(words);
         const std::optional<Launched> found = launched([](const char* name) { return std::getenv(name); });
         if (!found) return std::nullopt;
-        note("medulla-precompute: worker {} of {} by {} (--shard none: alone)\n", found->shard.index,
-             found->shard.count, found->from);
-        return found->shard;
+        note("medulla-precompute: worker {} of {} by {} (--shard none: alone)\n", found->share.index,
+             found->share.count, found->from);
+        return found->share;
     } catch (const Error& error) {
         throw UsageError("{}{}", words == "auto" ? "--shard auto: " : "", error.what());
     }
@@ -102,7 +102,7 @@ Job job_of(const Words& words) {
     job.output = words.output;
     if (!words.scene.empty()) job.inputs = {words.scene};
     job.resume = words.resume;
-    job.shard = shard_of(words.shard);
+    job.share = share_named(words.shard);
     job.progress = progress_of(words.progress);
     job.compression = compression_of(words.compression);
     return job;
@@ -111,7 +111,7 @@ Job job_of(const Words& words) {
 /// The slices of a job, or of a worker's share.
 std::vector<SliceId> slices_of_job(const Job& job) {
     const std::vector<SliceId> all = slices_of(plan_of(job.request));
-    return job.shard ? share_of(job.request, all, *job.shard) : all;
+    return job.share ? share_of(job.request, all, *job.share) : all;
 }
 
 double total_cost(const Job& job) {
@@ -132,10 +132,10 @@ void print_forecast(const Job& job, double share, bool as_json) {
                                    {"measured_slices", expected.measured},
                                    {"share_of_whole", share}};
     for (const Table* table : plan.present()) {
-        if (!as_json) print("{}: {} x {} bins\n", table->name, counted(table->cells(), "cell"), table->bins());
+        if (!as_json) print("{}: {} x {} bins\n", table->name(), counted(table->cells(), "cell"), table->bins());
         for (std::size_t k = 0; k + 1 < table->axes.size(); ++k) {
             const Axis& axis = table->axes[k];
-            json["tables"][table->name][axis.name] = axis.values;
+            json["tables"][table->name()][axis.name] = axis.values;
             if (!as_json)
                 print("    {:<10} {:>11}, {:.6g} .. {:.6g} [{}]\n", axis.name, counted(axis.size(), "node"),
                       axis.values.front(), axis.values.back(), axis_rule(axis.name).unit);
@@ -154,17 +154,17 @@ void print_forecast(const Job& job, double share, bool as_json) {
 /// A worker's last words: what it did, and what is to be done when all have.
 void print_share(const Job& job, const JobReport& report, double seconds, bool as_json) {
     if (as_json) {
-        const nlohmann::ordered_json json = {{"shards", json_name(report.shards)},
-                                             {"shard", job.shard->index},
-                                             {"of", job.shard->count},
+        const nlohmann::ordered_json json = {{"shards", json_name(report.folder)},
+                                             {"shard", job.share->index},
+                                             {"of", job.share->count},
                                              {"slices", report.slices},
                                              {"kept_before", report.kept},
                                              {"seconds", seconds}};
         print("{}\n", json_line(json));
         return;
     }
-    print("shard {}/{}: {} in {} after {}; when every shard is there: furtable merge {} -o {}\n", job.shard->index,
-          job.shard->count, counted(report.slices, "slice"), report.shards, duration_text(seconds), report.shards,
+    print("shard {}/{}: {} in {} after {}; when every shard is there: furtable merge {} -o {}\n", job.share->index,
+          job.share->count, counted(report.slices, "slice"), report.folder, duration_text(seconds), report.folder,
           job.output);
 }
 
@@ -188,7 +188,7 @@ void run(const Words& words) {
     const auto start = std::chrono::steady_clock::now();
     const JobReport report = run_job(job);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (job.shard && !report.was_complete) return print_share(job, report, seconds, words.json);
+    if (job.share && !report.was_complete) return print_share(job, report, seconds, words.json);
     nlohmann::ordered_json json = {{"output", json_name(words.output)},
                                    {"seconds", seconds},
                                    {"was_complete", report.was_complete},
@@ -198,16 +198,16 @@ void run(const Words& words) {
         std::size_t above = 0;  // cells that did not reach --target-error
         for (const double e : table->standard_error) worst = std::max(worst, e), above += e > job.request.target_error;
         if (job.request.target_error == 0) above = 0;
-        json["tables"][table->name] = {{"cells", table->cells()},
-                                       {"bins", table->bins()},
-                                       {"method", table->method},
-                                       {"worst_standard_error", worst}};
-        if (job.request.target_error > 0) json["tables"][table->name]["cells_above_target"] = above;
+        json["tables"][table->name()] = {{"cells", table->cells()},
+                                         {"bins", table->bins()},
+                                         {"method", table->method},
+                                         {"worst_standard_error", worst}};
+        if (job.request.target_error > 0) json["tables"][table->name()]["cells_above_target"] = above;
         if (!words.json && above > 0)
-            print("{}: {} of {} cells did not reach {:g}\n", table->name, above, table->cells(),
+            print("{}: {} of {} cells did not reach {:g}\n", table->name(), above, table->cells(),
                   job.request.target_error);
         if (!words.json)
-            print("{}: {} x {} bins, {}, worst relative standard error of a lobe {:.2e}\n", table->name,
+            print("{}: {} x {} bins, {}, worst relative standard error of a lobe {:.2e}\n", table->name(),
                   counted(table->cells(), "cell"), table->bins(), table->method, worst);
     }
     if (words.json)

@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char magic[8] = {'F', 'U', 'R', 'S', 'H', 'A', 'R', 'D'};
-constexpr std::uint64_t greatest_shard = std::uint64_t{1} << 30;
+constexpr std::uint64_t greatest_slice_file = std::uint64_t{1} << 30;
 constexpr std::uint64_t greatest_configuration = std::uint64_t{1} << 22;
 constexpr const char* suffix = ".shard";
 
@@ -59,7 +59,7 @@ void remove_plain(const std::string& file) {
 
 struct Inspected {
     std::vector<unsigned char> bytes;
-    ShardHeader header = {};
+    SliceFileHeader header = {};
     std::string damage;  ///< empty: whole
 
     Digest configuration() const {
@@ -72,9 +72,9 @@ struct Inspected {
 /// Reads a shard of whatever configuration and checks that it is what was written.
 Inspected inspect(const std::string& path) {
     Inspected found;
-    found.bytes = read_file(path, greatest_shard);
+    found.bytes = read_file(path, greatest_slice_file);
     const std::size_t size = found.bytes.size(), digest_size = sizeof(Digest);
-    if (size < sizeof(ShardHeader) + digest_size) {
+    if (size < sizeof(SliceFileHeader) + digest_size) {
         found.damage = fmt::format("only {} bytes", size);
         return found;
     }
@@ -93,30 +93,30 @@ Inspected inspect(const std::string& path) {
 
 }  // namespace
 
-ShardFolder::ShardFolder(std::string path, const Tables& plan)
+SliceFolder::SliceFolder(std::string path, const Tables& plan)
     : path_(std::move(path)),
       plan_(plan),
       configuration_text_(tables::configuration_text(plan)),
       configuration_(configuration_hash(plan)) {}
 
-ShardFolder::~ShardFolder() {
+SliceFolder::~SliceFolder() {
     if (lock_ >= 0) ::close(lock_);
 }
 
-std::string ShardFolder::file_of(const SliceId& id) const {
+std::string SliceFolder::file_of(const SliceId& id) const {
     return fmt::format("{}/{}-s{:04}-g{:04}{}", path_, name_of(id.table), id.sigma, id.g, suffix);
 }
 
-std::string ShardFolder::scratch() const { return temporary_name(path_ + "/tables.h5"); }
+std::string SliceFolder::scratch() const { return temporary_name(path_ + "/tables.h5"); }
 
-std::vector<std::string> ShardFolder::files() const {
+std::vector<std::string> SliceFolder::files() const {
     std::vector<std::string> list;
     for (const std::string& name : names_in(path_))
         if (ends_with(name, suffix)) list.push_back(path_ + "/" + name);
     return list;
 }
 
-void ShardFolder::open(bool alone) {
+void SliceFolder::open(bool alone) {
     struct stat info = {};
     if (::mkdir(path_.c_str(), 0777) == 0)
         sync_folder(folder_of(path_));
@@ -151,7 +151,7 @@ void ShardFolder::open(bool alone) {
     write_file(json, configuration_text_);
 }
 
-void ShardFolder::refuse_other(const std::string& file, const Digest& found) const {
+void SliceFolder::refuse_other(const std::string& file, const Digest& found) const {
     if (found == configuration_) return;
     std::string difference;
     try {
@@ -163,17 +163,17 @@ void ShardFolder::refuse_other(const std::string& file, const Digest& found) con
     throw Error("{}: it belongs to another job: {}", file, difference);
 }
 
-std::optional<Slice> ShardFolder::read(const SliceId& id, std::string& why) const {
+std::optional<Slice> SliceFolder::read(const SliceId& id, std::string& why) const {
     const std::string file = file_of(id);
     const Inspected found = inspect(file);
     why = found.damage;
     if (!why.empty()) return std::nullopt;
-    const ShardHeader& header = found.header;
+    const SliceFileHeader& header = found.header;
     refuse_other(file, found.configuration());
-    const Table& table = table_of(plan_, id.table);
+    const Table& table = plan_.at(id.table);
     Slice slice(slice_cells(table), table.bins());
     const std::size_t size = sizeof header + slice.cells * (4 * sizeof(double) + slice.bins * sizeof(float)) + 32;
-    if (header.version != shard_version || header.table != static_cast<std::uint32_t>(id.table) ||
+    if (header.version != slice_file_version || header.table != static_cast<std::uint32_t>(id.table) ||
         header.sigma != id.sigma || header.g != id.g || header.cells != slice.cells || header.bins != slice.bins ||
         found.bytes.size() != size) {
         why = "it holds another slice than its name says";
@@ -189,7 +189,7 @@ std::optional<Slice> ShardFolder::read(const SliceId& id, std::string& why) cons
     return slice;
 }
 
-std::vector<bool> ShardFolder::kept(const std::vector<SliceId>& ids) const {
+std::vector<bool> SliceFolder::kept(const std::vector<SliceId>& ids) const {
     const std::vector<std::string> there = files();
     std::vector<bool> good(ids.size(), false);
     for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -202,10 +202,10 @@ std::vector<bool> ShardFolder::kept(const std::vector<SliceId>& ids) const {
     return good;
 }
 
-void ShardFolder::write(const SliceId& id, const Slice& slice) const {
-    ShardHeader header = {};
+void SliceFolder::write(const SliceId& id, const Slice& slice) const {
+    SliceFileHeader header = {};
     std::memcpy(header.magic, magic, sizeof magic);
-    header.version = shard_version;
+    header.version = slice_file_version;
     header.table = static_cast<std::uint32_t>(id.table);
     std::memcpy(header.configuration, configuration_.data(), configuration_.size());
     header.sigma = id.sigma, header.g = id.g;
@@ -225,7 +225,7 @@ void ShardFolder::write(const SliceId& id, const Slice& slice) const {
     file.commit();
 }
 
-void ShardFolder::remove() {
+void SliceFolder::remove() {
     for (const std::string& name : names_in(path_))
         if (ends_with(name, suffix) || is_temporary(name) || name == "configuration.json" || name == "lock")
             remove_plain(path_ + "/" + name);
@@ -236,7 +236,7 @@ void ShardFolder::remove() {
         note("{}: cannot be removed: {}\n", path_, std::strerror(errno));
 }
 
-void ShardFolder::remove_if_empty() {
+void SliceFolder::remove_if_empty() {
     if (alone_ && files().empty()) remove();
 }
 
@@ -251,9 +251,9 @@ double number_of(const nlohmann::ordered_json& json, const std::string& where) {
     return value;
 }
 
-Table planned_table(const nlohmann::ordered_json& json, const std::string& name, const std::string& where) {
+Table planned_table(const nlohmann::ordered_json& json, TableId id, const std::string& where) {
     Table table;
-    table.name = name;
+    table.id = id;
     table.method = json.at("method").get<std::string>();
     table.seed = json.at("seed").get<std::uint64_t>();
     table.paths = json.at("paths").get<std::uint64_t>();
@@ -279,10 +279,9 @@ Tables read_configuration(const std::string& folder) {
         const auto json = parse_json<nlohmann::ordered_json>(text, text + bytes.size(), path);
         plan.program = json.at("program").get<std::string>();
         const auto& tables = json.at("tables");
-        if (tables.contains("azimuthal"))
-            plan.azimuthal = planned_table(tables["azimuthal"], "azimuthal", path + ": /azimuthal");
-        if (tables.contains("longitudinal"))
-            plan.longitudinal = planned_table(tables["longitudinal"], "longitudinal", path + ": /longitudinal");
+        for (const TableId id : table_ids)
+            if (tables.contains(name_of(id)))
+                plan[id] = planned_table(tables[name_of(id)], id, fmt::format("{}: /{}", path, name_of(id)));
     } catch (const nlohmann::json::exception& error) {
         throw Error("{}: expected a job's configuration: {}", path, error.what());
     }

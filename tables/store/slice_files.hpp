@@ -13,25 +13,22 @@ namespace medulla::tables {
 
 /// First bytes of a shard; all numbers little-endian. After it: energy, energy_error, standard_error, mean_length
 /// (float64[cells]), lobe (float32[cells][bins]), SHA-256 of all before.
-struct ShardHeader {
+struct SliceFileHeader {
     char magic[8];                    ///< "FURSHARD"
-    std::uint32_t version;            ///< shard_version
-    std::uint32_t table;              ///< a TableName
+    std::uint32_t version;            ///< slice_file_version
+    std::uint32_t table;              ///< a TableId
     unsigned char configuration[32];  ///< configuration_hash of the job
     std::uint32_t sigma, g;           ///< place on the axes
     std::uint64_t cells, bins;
 };
-static_assert(sizeof(ShardHeader) == 72);
-inline constexpr std::uint32_t shard_version = 1;
+static_assert(sizeof(SliceFileHeader) == 72);
+inline constexpr std::uint32_t slice_file_version = 1;
 
-/// How a shard was found.
-enum class ShardState { missing, good, damaged };
-
-class ShardFolder {
+class SliceFolder {
   public:
     /// Names the folder of a plan; touches no file.
-    ShardFolder(std::string path, const Tables& plan);
-    ~ShardFolder();
+    SliceFolder(std::string path, const Tables& plan);
+    ~SliceFolder();
 
     /// `<output>.shards`
     static std::string beside(const std::string& output) { return output + ".shards"; }

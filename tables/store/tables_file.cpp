@@ -160,9 +160,9 @@ void describe_array(hid_t group, const std::string& name, const char* unit, cons
 }
 
 void write_table(hid_t file, const Table& table, Compression compression, const std::string& path) {
-    const std::string where = fmt::format("{}: /{}", path, table.name);
+    const std::string where = fmt::format("{}: /{}", path, table.name());
     const Handle properties = untracked(H5P_GROUP_CREATE, where);
-    const Handle group(H5Gcreate2(file, table.name.c_str(), H5P_DEFAULT, properties, H5P_DEFAULT), H5Gclose,
+    const Handle group(H5Gcreate2(file, table.name(), H5P_DEFAULT, properties, H5P_DEFAULT), H5Gclose,
                        where + ": cannot be written");
     write_attribute(group, "method", table.method, where);
     write_attribute(group, "seed", table.seed, where);
@@ -335,18 +335,18 @@ std::vector<T> read_array(hid_t group, const std::string& name, hid_t memory, co
     return values;
 }
 
-Table read_table(hid_t file, const std::string& name, const std::string& path) {
-    const std::string where = fmt::format("{}: /{}", path, name);
-    const Handle group(H5Gopen2(file, name.c_str(), H5P_DEFAULT), H5Gclose, where + ": cannot be read");
+Table read_table(hid_t file, TableId id, const std::string& path) {
+    const std::string where = fmt::format("{}: /{}", path, name_of(id));
+    const Handle group(H5Gopen2(file, name_of(id), H5P_DEFAULT), H5Gclose, where + ": cannot be read");
     Table table;
-    table.name = name;
+    table.id = id;
     table.method = read_text(group, "method", where);
     table.seed = read_whole(group, "seed", where);
     table.paths = read_whole(group, "paths", where);
     table.target_error = read_optional(group, "target_error", where);
     table.time_budget = read_optional(group, "time_budget", where);
     std::vector<const char*> names = {"sigma", "g"};
-    if (name == "azimuthal") {
+    if (id == TableId::azimuthal) {
         if (H5Lexists(group, "absorption", H5P_DEFAULT) > 0) names.push_back("absorption");
         names.insert(names.end(), {"h", "phi"});
     } else {
@@ -360,7 +360,7 @@ Table read_table(hid_t file, const std::string& name, const std::string& path) {
         shape.push_back(table.axes.back().size());
         cells_and_bins *= static_cast<double>(shape.back());
     }
-    if (name == "longitudinal" && table.axes[3].values != std::vector<double>{0, 1})
+    if (id == TableId::longitudinal && table.axes[3].values != std::vector<double>{0, 1})
         throw Error("{}/side: expected the values 0 and 1", where);
     if (cells_and_bins > 4e9) throw Error("{}/lobe: expected at most 4e9 values, found {:g}", where, cells_and_bins);
     const std::vector<hsize_t> cells(shape.begin(), shape.end() - 1);
@@ -384,7 +384,7 @@ void write_tables(const Output& output, const Tables& tables, Compression compre
     quiet();
     register_zstd_filter();
     // Nothing is written that would be refused when it is read.
-    for (const Table* table : tables.present()) check_cells(*table, fmt::format("{}: /{}", path, table->name));
+    for (const Table* table : tables.present()) check_cells(*table, fmt::format("{}: /{}", path, table->name()));
     // The file is made in memory and written by us: HDF5 closes a file on a full disk without a word.
     Image image;
     {
@@ -439,8 +439,8 @@ Tables read_tables(const std::string& path) {
         throw Error("{}: expected format version 1 to {}, found {}", path, format_version, version);
     Tables tables;
     tables.program = read_text(file, "program", path);
-    if (H5Lexists(file, "azimuthal", H5P_DEFAULT) > 0) tables.azimuthal = read_table(file, "azimuthal", path);
-    if (H5Lexists(file, "longitudinal", H5P_DEFAULT) > 0) tables.longitudinal = read_table(file, "longitudinal", path);
+    for (const TableId id : table_ids)
+        if (H5Lexists(file, name_of(id), H5P_DEFAULT) > 0) tables[id] = read_table(file, id, path);
     if (tables.present().empty()) throw Error("{}: expected /azimuthal or /longitudinal, found neither", path);
     if (version >= first_with_hash) {
         const std::string expected = read_text(file, "sha256", path), found = hex(contents_hash(tables));

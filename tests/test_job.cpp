@@ -127,7 +127,7 @@ TEST_CASE("Worker shares are disjoint, complete, and as balanced as the costlies
     }
 }
 
-TEST_CASE("Which worker a process is: the option, and what launchers put into the environment", "[job]") {
+TEST_CASE("Worker share of a process: from its option, and from the environment of launchers", "[job]") {
     CHECK(parse_worker_share("2/3").index == 2);
     CHECK(parse_worker_share("2/3").count == 3);
     for (const char* wrong : {"0/3", "4/3", "1", "/", "1/", "/2", "1/2/3", "-1/2", "1/0", "a/b", "", "1/99999999999"})

@@ -2,6 +2,10 @@
 #include <fmt/core.h>
 
 #include <cmath>
+<<<<<<< HEAD
+=======
+#include <cstdio>
+>>>>>>> main
 #include <cstring>
 #include <optional>
 

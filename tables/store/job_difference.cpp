@@ -39,7 +39,11 @@ class Differences {
             if (!axis_rule(axis.name).bins && axis.name != "side") add(axis, found);
         if (found.has_axis("absorption") && !expected.has_axis("absorption"))
             add(option_of("absorption"), "none", range_text(found.axis("absorption")));
+<<<<<<< HEAD
         const std::size_t half = expected.id == TableId::longitudinal ? 2 : 1;  // of the circle that --bins cuts
+=======
+        const std::size_t half = expected.sides();  // of the circle that --bins cuts
+>>>>>>> main
         add("--bins", fmt::format("{}", half * expected.bins()), fmt::format("{}", half * found.bins()));
         add("--method", expected.method, found.method);
         add("--target-error", or_none(expected.target_error), or_none(found.target_error));
@@ -75,9 +79,8 @@ class Differences {
 std::string job_difference(const Tables& expected, const Tables& found) {
     Differences all;
     all.add("--table", table_names(expected), table_names(found));
-    for (const auto& [mine, other] :
-         {std::pair(&expected.azimuthal, &found.azimuthal), std::pair(&expected.longitudinal, &found.longitudinal)})
-        if (*mine && *other) all.add(**mine, **other);
+    for (const TableId id : table_ids)
+        if (expected[id] && found[id]) all.add(*expected[id], *found[id]);
     all.add("program", expected.program, found.program);
     return all.text();
 }

@@ -36,11 +36,7 @@ inline constexpr double greatest_radius = 1000;
 /// Most paths of any method: what the tracers have random numbers for.
 inline constexpr std::uint64_t most_paths = std::uint64_t{1} << 40;
 
-<<<<<<< HEAD
-/// Range of target_error.
-=======
 /// Least and greatest target_error.
->>>>>>> main
 inline constexpr double least_target = 1e-5, greatest_target = 0.1;
 
 /// Throws Error unless every cell is within the range of its solver.

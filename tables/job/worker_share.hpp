@@ -1,13 +1,7 @@
-<<<<<<< HEAD
-// The slices of one worker among many.
-#pragma once
-
-=======
 // The slices of one worker among many, as given by `--shard I/N`.
 #pragma once
 
 #include <optional>
->>>>>>> main
 #include <string>
 
 #include "tables/job/cost.hpp"
@@ -25,11 +19,7 @@ std::vector<SliceId> share_of(const Request& request, const std::vector<SliceId>
 
 inline constexpr std::uint32_t most_workers = 1000000;
 
-<<<<<<< HEAD
-/// "I/N", 1 <= I <= N. Throws Error that names --shard.
-=======
 /// "I/N", 1 <= I <= N <= most_workers. Throws Error that names --shard.
->>>>>>> main
 WorkerShare parse_worker_share(const std::string& text);
 
 }  // namespace medulla::tables

@@ -2,10 +2,6 @@
 #include <fmt/core.h>
 
 #include <cmath>
-<<<<<<< HEAD
-=======
-#include <cstdio>
->>>>>>> main
 #include <cstring>
 #include <optional>
 

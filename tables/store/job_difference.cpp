@@ -39,11 +39,7 @@ class Differences {
             if (!axis_rule(axis.name).bins && axis.name != "side") add(axis, found);
         if (found.has_axis("absorption") && !expected.has_axis("absorption"))
             add(option_of("absorption"), "none", range_text(found.axis("absorption")));
-<<<<<<< HEAD
-        const std::size_t half = expected.id == TableId::longitudinal ? 2 : 1;  // of the circle that --bins cuts
-=======
         const std::size_t half = expected.sides();  // of the circle that --bins cuts
->>>>>>> main
         add("--bins", fmt::format("{}", half * expected.bins()), fmt::format("{}", half * found.bins()));
         add("--method", expected.method, found.method);
         add("--target-error", or_none(expected.target_error), or_none(found.target_error));

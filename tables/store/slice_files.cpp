@@ -118,10 +118,6 @@ std::vector<std::string> SliceFolder::files() const {
 }
 
 void SliceFolder::open(bool alone) {
-<<<<<<< HEAD
-=======
-    struct stat info = {};
->>>>>>> main
     if (::mkdir(path_.c_str(), 0777) == 0)
         sync_folder(folder_of(path_));
     else if (errno != EEXIST)

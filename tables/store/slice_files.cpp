@@ -44,6 +44,7 @@ std::vector<std::string> names_in(const std::string& folder) {
     std::error_code error;
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
         names.push_back(entry->path().filename().string());
+    if (error == std::errc::not_a_directory) throw Error("{}: expected a folder, found another kind of file", folder);
     if (error && error != std::errc::no_such_file_or_directory)
         throw Error("{}: cannot be read: {}", folder, error.message());
     std::sort(names.begin(), names.end());
@@ -117,13 +118,10 @@ std::vector<std::string> SliceFolder::files() const {
 }
 
 void SliceFolder::open(bool alone) {
-    struct stat info = {};
     if (::mkdir(path_.c_str(), 0777) == 0)
         sync_folder(folder_of(path_));
     else if (errno != EEXIST)
         throw Error("{}: cannot be made: {}", path_, std::strerror(errno));
-    else if (::stat(path_.c_str(), &info) == 0 && !S_ISDIR(info.st_mode))
-        throw Error("{}: expected a folder, found a {}", path_, kind_name(info.st_mode));
     lock_ = ::open((path_ + "/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (lock_ < 0) throw Error("{}/lock: cannot be written: {}", path_, std::strerror(errno));
     if (::flock(lock_, (alone ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0) {

@@ -119,6 +119,16 @@ Degeneracy degeneracy(const CpModel& model, double tensor_norm) {
     return result;
 }
 
+int most_components(const std::vector<std::size_t>& shape) {
+    constexpr auto greatest = static_cast<std::size_t>(std::numeric_limits<int>::max());
+    const auto longest = std::max_element(shape.begin(), shape.end());
+    std::size_t product = 1;
+    for (auto length = shape.begin(); length != shape.end(); ++length)
+        if (length != longest)
+            product = *length > greatest / std::max<std::size_t>(product, 1) ? greatest : product * *length;
+    return static_cast<int>(product);
+}
+
 std::string to_string(Stop stop) {
     switch (stop) {
         case Stop::converged:
@@ -146,6 +156,9 @@ std::string summary(const CpReport& report) {
                       report.degeneracy.least_cosine, report.degeneracy.norm_ratio);
         line += text;
     }
+    if (report.spare > 0)
+        line +=
+            "; " + std::to_string(report.spare) + " of the components asked for left out: no such tensor needs them";
     return line;
 }
 

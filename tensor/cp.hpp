@@ -46,6 +46,10 @@ struct Degeneracy {
 /// `tensor_norm` is what norm_ratio divides by.
 Degeneracy degeneracy(const CpModel& model, double tensor_norm);
 
+/// Components that are enough for any tensor of this shape: one for each fibre along its longest axis (Kruskal 1989).
+/// At most the greatest int.
+int most_components(const std::vector<std::size_t>& shape);
+
 /// Why a solver stopped.
 enum class Stop {
     converged,    ///< error fell by less than `tolerance` of itself over the last half of all sweeps
@@ -69,6 +73,7 @@ struct CpReport {
     double seconds = 0;             ///< wall clock, all starts
     std::vector<double> trace;      ///< relative error after each sweep of the solve that was kept
     std::vector<double> starts;     ///< final relative error of each start, in order
+    int spare = 0;                  ///< components that were asked for and left out: see most_components
 
     /// Components cancel: their norms add up to more than 10 times the tensor's.
     bool degenerate() const { return degeneracy.norm_ratio > 10; }
@@ -111,8 +116,14 @@ CpResult cp_lm(const Tensor& tensor, const CpOptions& options);
 /// As cp_als, with every factor >= 0.
 CpResult cp_nonnegative(const Tensor& tensor, const CpOptions& options);
 
+/// The fibres of the tensor along its longest axis as components, no solve: options.rank is not read. Orthogonal and
+/// exact on the core of a HOSVD at finest_truncation; with factors >= 0 the fibres of the tensor itself, each number
+/// below 0 as 0, which no such factors fit better.
+CpResult cp_fibres(const Tensor& tensor, bool nonnegative);
+
 enum class Solver { als, lm, nonnegative };
-/// The fast path of each: cp_als_compressed, cp_lm, cp_nonnegative.
+/// The fast path of each: cp_als_compressed, cp_lm, cp_nonnegative; cp_fibres from most_components on, whose model then
+/// has no more than that, however many options.rank says.
 CpResult cp(const Tensor& tensor, Solver solver, const CpOptions& options);
 
 }  // namespace medulla::tensor

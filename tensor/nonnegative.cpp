@@ -126,6 +126,12 @@ CpResult cp_nonnegative(const Tensor& tensor, const CpOptions& options) {
 }
 
 CpResult cp(const Tensor& tensor, Solver solver, const CpOptions& options) {
+    require_valid(options);
+    if (options.rank >= most_components(tensor.shape)) {
+        CpResult result = cp_fibres(tensor, solver == Solver::nonnegative);
+        result.report.spare = options.rank - result.model.rank();
+        return result;
+    }
     switch (solver) {
         case Solver::als:
             return cp_als_compressed(tensor, options);

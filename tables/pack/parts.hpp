@@ -30,6 +30,8 @@ struct Part {
     bool lobes() const { return is_lobe(kind); }
     /// Components of the pack for each component of the model.
     int copies() const { return static_cast<int>(std::max<std::size_t>(1, exit_maps.size())); }
+    /// Components of a model that are enough for any values.
+    int most_rank() const { return tensor::most_components(values.shape); }
     /// Bytes that one component of the model takes in a pack: rows of so many bits a number, a scale, an integral.
     double component_bytes(double bits) const;
 };

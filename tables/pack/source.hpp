@@ -43,10 +43,16 @@ class Source {
     /// Relative L2 standard error of a lobe (between nodes: interpolated); of a pack, that of all lobes of the table it
     /// was made from, as its provenance has it. 0 where nothing is known.
     virtual double noise(TableKind kind, const Parameters& at) const = 0;
-    /// Share of the slab's scattered energy that leaves backward.
-    virtual double back_fraction(const Parameters& at) const = 0;
-    /// Share of the disc's scattered energy that absorption leaves; 1 where there is no such axis.
-    virtual double survival(const Parameters& at) const = 0;
+    /// Share of the slab's scattered energy that leaves backward, as the splines and factors have it: between nodes and
+    /// in a low-rank sum it may lie beyond [0, 1].
+    virtual double signed_back_fraction(const Parameters& at) const = 0;
+    /// Length l such that absorption leaves exp(-absorption l) of the disc's scattered energy, likewise: it may lie below
+    /// 0. 0 where there is no such axis.
+    virtual double signed_survival_length(const Parameters& at) const = 0;
+    /// The same clamped to [0, 1].
+    double back_fraction(const Parameters& at) const;
+    /// Share of the disc's scattered energy that absorption leaves, in [0, 1]; 1 where there is no such axis.
+    double survival(const Parameters& at) const;
     bool absorbs() const;  ///< whether azimuthal lobes have an axis of absorption
 
     /// The first axis beyond whose ends `at` lies, its range and the value, as text; empty if it lies within, or there
@@ -68,6 +74,9 @@ std::unique_ptr<Source> pack_source(std::vector<unsigned char> bytes, const std:
 /// Reads and validates a pack's bytes (`default`: the one built in). Throws Error that names the path; `or_tables`:
 /// that a tables file would do as well.
 std::vector<unsigned char> read_pack(const std::string& path, bool or_tables = false);
+
+/// A number >= 0 that a pack's provenance states of the fit of a kind, or `otherwise`.
+double stated(const PackView& pack, TableKind kind, const char* what, double otherwise);
 
 /// Error of one source against another, over every node of the reference.
 struct LobeError {

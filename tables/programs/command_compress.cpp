@@ -1,6 +1,8 @@
 // furtable compress and furtable diff: make a pack, and say how far one file is from another.
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "tables/pack/compress.hpp"
 #include "tables/programs/commands.hpp"
 #include "tables/store/file.hpp"
@@ -29,6 +31,24 @@ const char* mirror_name(Mirror mirror) {
 
 /// Whether fit_error is of normalised lobes.
 bool is_nonnegative(const TableReport& report) { return report.parts[0].solve.solver == std::string("nonnegative"); }
+
+/// Of one unsized pack's worst kind how far it is, and what comes nearer: more components, but where the exit splines
+/// leave four times as much as the components of a kind.
+std::string distance_of(const CompressResult& result, int rank) {
+    const LobeError& worst =
+        *std::max_element(result.errors.begin(), result.errors.end(),
+                          [](const LobeError& a, const LobeError& b) { return a.relative < b.relative; });
+    const bool nearer = std::any_of(result.tables.begin(), result.tables.end(), [](const TableReport& report) {
+        const double exit = report.exit_error * report.exit_error;
+        return is_lobe(report.kind) && report.fit_error * report.fit_error - exit > exit / 16;
+    });
+    return fmt::format("rank {} is {:.1e} (relative L2) from the table, in its {} lobes; ", rank, worst.relative,
+                       name_of(worst.kind)) +
+           (nearer
+                ? fmt::format("--max-bytes {}, the size of the built-in pack, takes more components and comes nearer",
+                              default_bytes)
+                : "more components come no nearer: what is left is the exit splines'");
+}
 
 nlohmann::ordered_json report_json(const TableReport& report) {
     nlohmann::ordered_json json = {
@@ -77,18 +97,13 @@ void run_compress(const CompressWords& words) {
     if (words.nonnegative) options.solver = tensor::Solver::nonnegative;
     if (words.max_error > 0) options.max_error = words.max_error;
     if (words.max_bytes > 0) options.max_bytes = words.max_bytes;
+    const bool sized = options.max_error || options.max_bytes;
     std::string input;
     for (const std::string& file : words.files) input += (input.empty() ? "" : ", ") + file_name(file);
     refuse_input(output, words.files);
     const Tables tables = read_all(words.files);
     const CompressResult result = compress(tables, options, input);
     write_file(output, result.pack.data(), result.pack.size());
-    // Who asked for no size is told what the default pack's would give.
-    const bool unsized = !words.rank && !options.max_error && !options.max_bytes;
-    const auto larger = [&] {
-        options.max_bytes = default_bytes;
-        return compress(tables, options, input);
-    };
     if (words.json) {
         nlohmann::ordered_json json = {{"output", output},
                                        {"bytes", result.pack.size()},
@@ -98,10 +113,6 @@ void run_compress(const CompressWords& words) {
             json["factors"][medulla::tables::name_of(report.kind)] = report_json(report);
         json["errors"] = to_json(result.errors);
         json["degeneracy"] = to_json(result.degeneracy);
-        if (unsized) {
-            const CompressResult more = larger();
-            json["max_bytes_153600"] = {{"bytes", more.pack.size()}, {"errors", to_json(more.errors)}};
-        }
         fmt::print("{}\n", json.dump());
         return;
     }
@@ -110,23 +121,18 @@ void run_compress(const CompressWords& words) {
                    medulla::tables::name_of(report.kind), is_nonnegative(report) ? "in the pack" : "factors",
                    report.fit_error, report.exit_error, report.rounding, report.noise);
         for (const PartReport& part : report.parts)
-            fmt::print("  {:<8} rank {:>3}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
-                       mirror_name(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
-                       tensor::to_string(part.solve.stop), part.solve.seconds, part.solve.degeneracy.least_cosine,
-                       part.solve.degeneracy.norm_ratio);
+            fmt::print(
+                "  {:<8} rank {:>3}{}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
+                mirror_name(part.mirror), part.rank,
+                is_lobe(report.kind) && !sized && part.rank < options.rank ? " (all that this table can have)" : "",
+                part.solve.solver, part.solve.iterations, tensor::to_string(part.solve.stop), part.solve.seconds,
+                part.solve.degeneracy.least_cosine, part.solve.degeneracy.norm_ratio);
     }
     print(result.errors);
     print(result.degeneracy);
     fmt::print("{}: {} bytes in {:.2f} s ({:.2f} s of processor time)\n", output, result.pack.size(),
                result.solve_seconds, result.cpu_seconds);
-    if (!unsized) return;
-    fmt::print("for comparison, solving for --max-bytes {} (give a size, --rank 16 say, to leave it out) ..\n",
-               default_bytes);
-    std::fflush(stdout);
-    std::string errors;
-    for (const LobeError& error : larger().errors)
-        errors += fmt::format("{}{} {:.1e}", errors.empty() ? "" : ", ", name_of(error.kind), error.relative);
-    fmt::print("with --max-bytes {}: {}\n", default_bytes, errors);
+    if (!words.rank && !sized) fmt::print("{}\n", distance_of(result, options.rank));
 }
 
 struct DiffWords {

@@ -130,9 +130,24 @@ void run_info(const InfoWords& words) {
 
 struct VerifyWords {
     std::vector<std::string> files;
-    double most_dip = 0.5;
+    std::optional<double> most_dip;
     bool json = false;
 };
+
+// What verify expects of a pack follows from the relative L2 error e that its provenance states for each kind. A
+// table's values lie in a range, so what a pack has beyond it is part of its error.
+
+/// Of a pack that states no error.
+constexpr double unstated_error = 1e-2;
+/// What a lobe has below 0, over its integral. Packs of ranks 1 to 32 of tables of 4 x 3 x 4 and 10 x 6 x 8 nodes have
+/// at most 1.7 times the greatest e of their kinds, or more than most_negative, from where on factors are no density at
+/// all.
+constexpr double negative_per_error = 4, most_negative = 0.5;
+/// One of N shares is off by at most e times the root of the sum of their squares, e sqrt(N), and by rounding. No pack
+/// that we write is off by a fifth of most_share_excess.
+constexpr double share_rounding = 1e-4, most_share_excess = 0.05;
+
+double stated_error(const PackView& pack, TableKind kind) { return stated(pack, kind, "relative_l2", unstated_error); }
 
 /// Relative L2 distance of a lobe from its mirror image.
 double asymmetry(const std::vector<double>& lobe) {
@@ -158,25 +173,33 @@ void verify_table(const Table& table, const std::string& path) {
     }
 }
 
-/// Greatest excess over [0, 1] of the share of the slab's light that leaves backward; NaN if one is.
-double share_excess(const Source& pack) {
-    if (!pack.has(TableKind::back_fraction)) return 0;
+/// Shares of the slab's light that leaves backward, at every node.
+void verify_shares(const PackView& view, const Source& pack, const std::string& path) {
+    if (!pack.has(TableKind::back_fraction)) return;
     const std::vector<Axis> axes = pack.parameter_axes(TableKind::back_fraction);
-    double worst = 0;
+    const double nodes = static_cast<double>(axes[0].size() * axes[1].size() * axes[2].size());
+    const double most =
+        std::min(stated_error(view, TableKind::back_fraction) * std::sqrt(nodes) + share_rounding, most_share_excess);
     Parameters at;
     for (const double sigma : axes[0].values)
         for (const double g : axes[1].values)
             for (const double theta_i : axes[2].values) {
                 at.sigma = sigma, at.g = g, at.theta_i = theta_i;
-                const double share = pack.back_fraction(at), excess = std::max(-share, share - 1);
-                worst = std::isnan(excess) ? excess : std::max(worst, excess);
+                const double share = pack.signed_back_fraction(at);
+                if (!(share >= -most && share <= 1 + most))
+                    throw Error(
+                        "{}: {}: sigma {:g}, g {:g}, theta_i {:g}: expected a share within {:.1e} of [0, 1], "
+                        "found {:g}",
+                        path, name_of(TableKind::back_fraction), sigma, g, theta_i, most, share);
             }
-    return worst;
 }
 
-/// Absorption leaves all at 0 and less and less beyond it, at every node.
-void verify_survival(const Source& pack, const std::string& path) {
+/// Absorption leaves all at 0 and less and less beyond it, at every node: lengths are above 0, and where there is no
+/// absorption to show it within their error of that.
+void verify_survival(const PackView& view, const Source& pack, const std::string& path) {
     const std::vector<Axis> axes = pack.parameter_axes(TableKind::azimuthal);  // sigma, g, absorption, h
+    const double nodes = static_cast<double>(axes[0].size() * axes[1].size() * axes[2].size() * axes[3].size());
+    const double most = std::min(stated_error(view, TableKind::survival) * std::sqrt(nodes) + share_rounding, 1.0);
     for (const double sigma : axes[0].values)
         for (const double g : axes[1].values)
             for (const double h : axes[3].values) {
@@ -184,7 +207,11 @@ void verify_survival(const Source& pack, const std::string& path) {
                 for (const double a : axes[2].values) {
                     Parameters at;
                     at.sigma = sigma, at.g = g, at.absorption = a, at.h = h;
-                    const double left = pack.survival(at);
+                    const double left = pack.survival(at), length = pack.signed_survival_length(at);
+                    if (!(length >= -most))
+                        throw Error(
+                            "{}: sigma {:g}, g {:g}, absorption {:g}, h {:g}: expected a length >= 0, found {:g}", path,
+                            sigma, g, a, h, length);
                     if (!(left > 0 && (a == 0 ? left == 1 : left < before)))
                         throw Error(
                             "{}: sigma {:g}, g {:g}, absorption {:g}, h {:g}: expected less to be left than {:g}, "
@@ -195,26 +222,22 @@ void verify_survival(const Source& pack, const std::string& path) {
             }
 }
 
-/// What the dips below 0 of signed lobes would add to their integral 1, the most at any node: at most a lobe's L1
-/// error, so coarse packs, which a bound of --max-error may ask for, dip deep and are yet what they should be.
-double greatest_dip(const PackView& pack, const Source& source) {
+/// What signed lobes have below 0, over their integral 1, the most at any node: at most a lobe's L1 error.
+double greatest_negative(const PackView& pack, const Source& source, TableKind kind) {
     double greatest = 0;
-    for (const TableKind kind : lobe_kinds) {
-        if (!source.has(kind)) continue;
-        const std::vector<Axis> axes = source.parameter_axes(kind);
-        std::size_t nodes = 1;
-        for (const Axis& axis : axes) nodes *= axis.size();
-        for (std::size_t node = 0; node < nodes; ++node) {
-            Parameters at;
-            std::size_t rest = node;
-            for (const Axis& axis : axes) at.set(axis.name, axis.values[rest % axis.size()]), rest /= axis.size();
-            LobeQuery query;
-            query.sigma = static_cast<float>(at.sigma), query.g = static_cast<float>(at.g);
-            query.h = static_cast<float>(at.h), query.theta_i = static_cast<float>(at.theta_i);
-            query.absorption = static_cast<float>(at.absorption);
-            const double whole = held_integral(pack[kind], contract_signed(pack[kind], query));
-            greatest = std::max(greatest, whole - 1);
-        }
+    const std::vector<Axis> axes = source.parameter_axes(kind);
+    std::size_t nodes = 1;
+    for (const Axis& axis : axes) nodes *= axis.size();
+    for (std::size_t node = 0; node < nodes; ++node) {
+        Parameters at;
+        std::size_t rest = node;
+        for (const Axis& axis : axes) at.set(axis.name, axis.values[rest % axis.size()]), rest /= axis.size();
+        LobeQuery query;
+        query.sigma = static_cast<float>(at.sigma), query.g = static_cast<float>(at.g);
+        query.h = static_cast<float>(at.h), query.theta_i = static_cast<float>(at.theta_i);
+        query.absorption = static_cast<float>(at.absorption);
+        const double whole = held_integral(pack[kind], contract_signed(pack[kind], query));
+        greatest = std::max(greatest, whole - 1);
     }
     return greatest;
 }
@@ -226,14 +249,10 @@ struct Verified {
     PackDegeneracy degeneracy;
 };
 
-/// Every node of a pack: finite, >= 0, integral 1; shares of energy in [0, 1]. What dips hold is at most `most_dip`: at
-/// half of a lobe its factors are no density at all.
-void verify_pack(const PackView& pack, const Source& source, const std::string& path, double most_dip,
+/// Every node of a pack: finite, >= 0, integral 1; shares of energy in [0, 1].
+void verify_pack(const PackView& pack, const Source& source, const std::string& path, std::optional<double> most_dip,
                  Verified& found) {
-    const double excess = share_excess(source);
-    if (!(excess <= 0.5))
-        throw Error("{}: {}: expected shares within 0.5 of [0, 1], found one off by {:.2e}", path,
-                    name_of(TableKind::back_fraction), excess);
+    verify_shares(pack, source, path);
     found.energy_error = 0;
     for (const LobeError& error : compare(source, source)) {
         if (!(error.energy <= 1e-3) || !(error.least >= 0))  // bins at dips' ends are integrated to 1e-5 or so
@@ -241,15 +260,22 @@ void verify_pack(const PackView& pack, const Source& source, const std::string& 
                         name_of(error.kind), error.least, error.energy);
         found.energy_error = std::max(*found.energy_error, error.energy);
     }
-    if (source.absorbs()) verify_survival(source, path);
-    found.dip = greatest_dip(pack, source);
-    if (!(*found.dip <= most_dip))
-        throw Error("{}: expected lobes whose dips below 0 hold at most {:g} of their integral 1, found {:.2e}", path,
-                    most_dip, *found.dip);
+    if (source.absorbs()) verify_survival(pack, source, path);
+    found.dip = 0;
+    for (const TableKind kind : lobe_kinds) {
+        if (!source.has(kind)) continue;
+        const double stated = stated_error(pack, kind), negative = greatest_negative(pack, source, kind);
+        const double most = most_dip.value_or(std::min(negative_per_error * stated, most_negative));
+        if (!(negative <= most))
+            throw Error("{}: {} lobes: expected at most {:.2e} of a lobe's integral 1 below 0{}, found {:.2e}", path,
+                        name_of(kind), most,
+                        most_dip ? "" : fmt::format(" (the pack states an error of {:.1e})", stated), negative);
+        found.dip = std::max(*found.dip, negative);
+    }
 }
 
 /// Throws Error that says what is wrong with it.
-Verified verify(const std::string& file, double most_dip) {
+Verified verify(const std::string& file, std::optional<double> most_dip) {
     Verified found;
     if (is_tables(file)) {
         const Tables tables = read_tables(file);
@@ -298,9 +324,9 @@ void run_verify(const VerifyWords& words) {
                        counted(*found.cells, "cell"));
         else
             fmt::print(
-                "{}: ok: checksum, structure, lobes >= 0 of integral 1 within {:.1e}; dips hold at most {:.1e} of "
-                "{:g}\n",
-                file, *found.energy_error, *found.dip, words.most_dip);
+                "{}: ok: checksum, structure, lobes >= 0 of integral 1 within {:.1e}; their signed sums have at most "
+                "{:.1e} of it below 0\n",
+                file, *found.energy_error, *found.dip);
         print(found.degeneracy);
     }
     if (words.json) fmt::print("{}\n", json.dump());
@@ -328,12 +354,12 @@ void add_verify(CLI::App& app, Action& action) {
             command.add_option("FILE", words.files, "tables files and packs; all are checked, also after a bad one")
                 ->required();
             command
-                .add_option(
-                    "--max-dip", words.most_dip,
-                    "how much of a pack's signed lobe may lie below 0, where it is held at 0. The default tells "
-                    "densities from nonsense; `diff` says how accurate a pack is")
-                ->check(CLI::NonNegativeNumber)
-                ->capture_default_str();
+                .add_option("--max-dip", words.most_dip,
+                            "how much of the integral of a pack's signed lobe may lie below 0, where it is clamped to "
+                            "0 (default: "
+                            "4 times the error that the pack states for its kind, at most 0.5). `diff` says how "
+                            "accurate a pack is")
+                ->check(CLI::NonNegativeNumber);
             command.add_flag("--json", words.json, "print one JSON object: an entry with the same keys for every file");
         },
         run_verify);

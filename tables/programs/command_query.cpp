@@ -1,6 +1,9 @@
 // furtable query: one lobe from either file, in columns, CSV or JSON.
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <limits>
+
 #include "tables/programs/commands.hpp"
 
 namespace medulla::tables {
@@ -28,6 +31,14 @@ void print_columns(const std::vector<Column>& columns, const char* separator) {
     }
 }
 
+/// Splines overshoot between nodes, and low-rank sums everywhere: what has a bound is clamped to it, and that is said.
+void say_clamped(const std::string& what, double value, double low, double high, nlohmann::ordered_json& clamped) {
+    if (value >= low && value <= high) return;
+    say("furtable",
+        fmt::format("query: {} {:g} of the splines is clamped to {:g}", what, value, value < low ? low : high));
+    clamped[what] = value;
+}
+
 void run_query(const QueryWords& words) {
     const bool azimuthal = words.table == "azimuthal";
     if (azimuthal && (!*words.h || *words.theta)) throw UsageError("query: --table azimuthal needs --h, not --theta");
@@ -52,16 +63,25 @@ void run_query(const QueryWords& words) {
     else
         json["theta_i"] = words.theta_degrees * pi / 180;
     if (azimuthal && source->absorbs()) json["absorption"] = at.absorption;
+    nlohmann::ordered_json clamped;
+    constexpr double unbounded = std::numeric_limits<double>::infinity();
+    if (!azimuthal)
+        say_clamped("back_share", source->signed_back_fraction(at), 0, 1, clamped);
+    else if (source->absorbs())
+        say_clamped("survival_length", source->signed_survival_length(at), 0, unbounded, clamped);
     for (const TableKind kind : kinds) {
         std::vector<double> lobe = source->lobe(kind, at, bins);
         if (mirrored) std::reverse(lobe.begin(), lobe.end());
+        const std::string name = azimuthal ? "density" : (kind == TableKind::longitudinal_back ? "back" : "forward");
+        say_clamped(name, *std::min_element(lobe.begin(), lobe.end()), 0, unbounded, clamped);
+        for (double& value : lobe) value = std::max(value, 0.0);
         const double energy = energy_of(*source, kind, at);
         if (azimuthal)
             for (double& value : lobe) value *= energy;  // C^N itself; C^M of the papers is normalised
-        const std::string name = azimuthal ? "density" : (kind == TableKind::longitudinal_back ? "back" : "forward");
         json[azimuthal ? "energy" : "energy_" + name] = energy;
         columns.push_back({name, std::move(lobe)});
     }
+    if (!clamped.empty()) json["clamped"] = clamped;
     if (words.json) {
         for (const Column& column : columns) json[column.name] = column.values;
         fmt::print("{}\n", json.dump());

@@ -90,7 +90,7 @@ class Programs(unittest.TestCase):
         text = " ".join(run("medulla-precompute", "--help")[1].split())
         self.assertIn("relative L2 error of 0.001", text)
         self.assertIn("padded with zeros to a multiple of 8", run("furtable", "compress", "--help")[1])
-        self.assertRegex(run("furtable", "verify", "--help")[1], r"--max-dip FLOAT.*=0\.5")
+        self.assertRegex(run("furtable", "verify", "--help")[1], r"(?s)--max-dip FLOAT.*4 times the\s+error.*at\s+most 0\.5")
         info = run("furtable", "info", self.path("t.h5"))[1]
         self.assertIn("method auto: without paths, or with 2000", info)
         file = self.path("exact.h5")

@@ -1,6 +1,8 @@
 // furtable compress and furtable diff: make a pack, and the error of one file against another.
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "tables/pack/compress.hpp"
 #include "tables/programs/commands.hpp"
 #include "tables/programs/number.hpp"
@@ -31,6 +33,24 @@ const char* mirror_name(Mirror mirror) {
 
 /// Whether fit_error refers to normalised lobes.
 bool is_nonnegative(const TableReport& report) { return report.parts[0].solve.solver == std::string("nonnegative"); }
+
+/// Text for a pack without a size option: the error of its worst kind, and whether more components reduce it. They do
+/// not if the squared error of the exit splines is more than 16 times that of the components, for every kind.
+std::string distance_of(const CompressResult& result, int rank) {
+    const LobeError& worst =
+        *std::max_element(result.errors.begin(), result.errors.end(),
+                          [](const LobeError& a, const LobeError& b) { return a.relative < b.relative; });
+    const bool nearer = std::any_of(result.tables.begin(), result.tables.end(), [](const TableReport& report) {
+        const double exit = report.exit_error * report.exit_error;
+        return is_lobe(report.kind) && report.fit_error * report.fit_error - exit > exit / 16;
+    });
+    return fmt::format("rank {} is {:.1e} (relative L2) from the table, in its {} lobes; ", rank, worst.relative,
+                       name_of(worst.kind)) +
+           (nearer
+                ? fmt::format("--max-bytes {}, the size of the built-in pack, takes more components and is more accurate",
+                              default_bytes)
+                : "more components do not help: the error left is that of the exit splines");
+}
 
 nlohmann::ordered_json report_json(const TableReport& report) {
     nlohmann::ordered_json json = {
@@ -80,17 +100,12 @@ void run_compress(const CompressArguments& args) {
     if (args.nonnegative) options.solver = tensor::Solver::nonnegative;
     options.max_error = args.max_error;
     options.max_bytes = args.max_bytes;
+    const bool sized = options.max_error || options.max_bytes;
     std::string input;
     for (const std::string& file : args.files) input += (input.empty() ? "" : ", ") + json_name(file_name(file));
     const Tables tables = read_all(args.files);
     const CompressResult result = compress(tables, options, input);
     output.write(result.pack.data(), result.pack.size());
-    // Without a size option, prints what the default pack's size would give.
-    const bool unsized = !args.rank && !options.max_error && !options.max_bytes;
-    const auto larger = [&] {
-        options.max_bytes = default_bytes;
-        return compress(tables, options, input);
-    };
     if (args.json) {
         nlohmann::ordered_json json = {{"output", json_name(output.path())},
                                        {"bytes", result.pack.size()},
@@ -100,10 +115,6 @@ void run_compress(const CompressArguments& args) {
             json["factors"][medulla::tables::name_of(report.kind)] = report_json(report);
         json["errors"] = to_json(result.errors);
         json["degeneracy"] = to_json(result.degeneracy);
-        if (unsized) {
-            const CompressResult more = larger();
-            json["max_bytes_153600"] = {{"bytes", more.pack.size()}, {"errors", to_json(more.errors)}};
-        }
         print("{}\n", json_line(json));
         return;
     }
@@ -112,23 +123,17 @@ void run_compress(const CompressArguments& args) {
               medulla::tables::name_of(report.kind), is_nonnegative(report) ? "in the pack" : "factors",
               report.fit_error, report.exit_error, report.rounding, report.noise);
         for (const PartReport& part : report.parts)
-            print("  {:<8} rank {:>3}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
-                  mirror_name(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
-                  tensor::to_string(part.solve.stop), part.solve.seconds, part.solve.degeneracy.least_cosine,
-                  part.solve.degeneracy.norm_ratio);
+            print("  {:<8} rank {:>3}{}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
+                  mirror_name(part.mirror), part.rank,
+                  is_lobe(report.kind) && !sized && part.rank < options.rank ? " (all that this table can have)" : "",
+                  part.solve.solver, part.solve.iterations, tensor::to_string(part.solve.stop), part.solve.seconds,
+                  part.solve.degeneracy.least_cosine, part.solve.degeneracy.norm_ratio);
     }
     print(result.errors);
     print(result.degeneracy);
     print("{}: {} bytes in {:.2f} s ({:.2f} s of processor time)\n", output.path(), result.pack.size(),
           result.solve_seconds, result.cpu_seconds);
-    if (!unsized) return;
-    print("for comparison, solving for --max-bytes {} (give a size, --rank 16 say, to leave it out) ..\n",
-          default_bytes);
-    flush_output();
-    std::string errors;
-    for (const LobeError& error : larger().errors)
-        errors += fmt::format("{}{} {:.1e}", errors.empty() ? "" : ", ", name_of(error.kind), error.relative);
-    print("with --max-bytes {}: {}\n", default_bytes, errors);
+    if (!args.rank && !sized) print("{}\n", distance_of(result, options.rank));
 }
 
 struct DiffArguments {

@@ -1,6 +1,9 @@
 // furtable query: one lobe from either file, in columns, CSV or JSON.
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <limits>
+
 #include "tables/programs/commands.hpp"
 #include "tables/programs/number.hpp"
 #include "tables/store/json_text.hpp"
@@ -30,6 +33,15 @@ void print_columns(const std::vector<Column>& columns, const char* separator) {
     }
 }
 
+/// Says where a value lies outside its bounds and is clamped: splines overshoot between nodes, truncated components
+/// anywhere.
+void say_clamped(const std::string& what, double value, double low, double high, nlohmann::ordered_json& clamped) {
+    if (value >= low && value <= high) return;
+    say("furtable",
+        fmt::format("query: {} {:g} of the splines is clamped to {:g}", what, value, value < low ? low : high));
+    clamped[what] = value;
+}
+
 void run_query(const QueryArguments& args) {
     const bool azimuthal = args.table == "azimuthal";
     if (azimuthal && (!*args.h || *args.theta)) throw UsageError("query: --table azimuthal needs --h, not --theta");
@@ -53,16 +65,25 @@ void run_query(const QueryArguments& args) {
     else
         json["theta_i"] = args.theta_degrees * pi / 180;
     if (azimuthal && source->absorbs()) json["absorption"] = at.absorption;
+    nlohmann::ordered_json clamped;
+    constexpr double unbounded = std::numeric_limits<double>::infinity();
+    if (!azimuthal)
+        say_clamped("back_share", source->signed_back_fraction(at), 0, 1, clamped);
+    else if (source->absorbs())
+        say_clamped("survival_length", source->signed_survival_length(at), 0, unbounded, clamped);
     for (const TableKind kind : kinds) {
         std::vector<double> lobe = source->lobe(kind, at, bins);
         if (mirrored) std::reverse(lobe.begin(), lobe.end());
+        const std::string name = azimuthal ? "density" : (kind == TableKind::longitudinal_back ? "back" : "forward");
+        say_clamped(name, *std::min_element(lobe.begin(), lobe.end()), 0, unbounded, clamped);
+        for (double& value : lobe) value = std::max(value, 0.0);
         const double energy = energy_of(*source, kind, at);
         if (azimuthal)
             for (double& value : lobe) value *= energy;  // C^N itself; C^M of the papers is normalised
-        const std::string name = azimuthal ? "density" : (kind == TableKind::longitudinal_back ? "back" : "forward");
         json[azimuthal ? "energy" : "energy_" + name] = energy;
         columns.push_back({name, std::move(lobe)});
     }
+    if (!clamped.empty()) json["clamped"] = clamped;
     if (args.json) {
         for (const Column& column : columns) json[column.name] = column.values;
         print("{}\n", json_line(json));

@@ -123,9 +123,14 @@ void check_cells(const Table& table, const std::string& where) {
         }
         // A sum of floats, each with a relative rounding of 2^-24.
         if (!(std::abs(sum - 1) <= 1e-6)) fail(fmt::format("expected a lobe of integral 1, found {:.9g}", sum));
-        for (const auto* array : {&table.energy, &table.energy_error, &table.standard_error, &table.mean_length})
-            if (!((*array)[cell] >= 0))
-                fail(fmt::format("expected an energy, errors and a length >= 0, found {:g}", (*array)[cell]));
+        for (const double error : {table.energy_error[cell], table.standard_error[cell]})
+            if (!(error >= 0 && std::isfinite(error)))
+                fail(fmt::format("expected finite errors >= 0, found {:g}", error));
+        if (!(table.energy[cell] >= 0 && table.energy[cell] <= 1 + 5 * table.energy_error[cell] + 1e-12))
+            fail(fmt::format("expected an energy in [0, 1], found {:g} with standard error {:.2e}", table.energy[cell],
+                             table.energy_error[cell]));
+        if (!(table.mean_length[cell] >= 0))
+            fail(fmt::format("expected a length >= 0, found {:g}", table.mean_length[cell]));
         if (cell % sides != 0) continue;
         double energy = 0, variance = 0;
         for (std::size_t s = 0; s < sides; ++s) {

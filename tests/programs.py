@@ -259,7 +259,6 @@ class Programs(unittest.TestCase):
             self.fails(1, "furtable", *query, "--sigma", 4.5, "--g", 0.3, "--h", 0.1, names=["sigma", "4.5"])
             self.fails(1, "furtable", *query, "--sigma", 1, "--g", 0.7, "--h", 0.1, names=["g", "0.7"])
             self.fails(1, "furtable", *query, "--sigma", 1, "--g", 0.3, "--h", 1.1, names=["h", "1.1"])
-            self.fails(1, "furtable", *query, "--sigma", "nan", "--g", 0.3, "--h", 0.5, names=["sigma"])
             self.fails(1, "furtable", "query", file, "--table", "longitudinal", "--sigma", 1, "--g", 0.3, "--theta", 75,
                        names=["theta_i"])
 

@@ -8,8 +8,10 @@
 #include <set>
 
 #include "tables/error.hpp"
+#include "tables/job/launcher.hpp"
 #include "tables/job/precompute.hpp"
 #include "tables/store/file.hpp"
+#include "tables/store/job_difference.hpp"
 #include "tables/store/merge.hpp"
 #include "tests/support/small_request.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -60,7 +62,9 @@ TEST_CASE("The configuration hash depends on everything that decides bytes, and 
         Request other = request;
         change(other);
         CHECK(seen.insert(configuration_hash(plan_of(other))).second);
+        CHECK_FALSE(job_difference(plan_of(request), plan_of(other)).empty());  // and an option says why
     };
+    CHECK(job_difference(plan_of(request), plan_of(request)).empty());
     differs([](Request& r) { r.seed = 2; });
     differs([](Request& r) { r.paths = 201; });
     differs([](Request& r) { r.bins = 38; });
@@ -123,20 +127,20 @@ TEST_CASE("Worker shares are disjoint, complete, and as balanced as the costlies
     }
 }
 
-TEST_CASE("Worker share of a process: from its option, and from the environment of Slurm and Open MPI", "[job]") {
+TEST_CASE("Worker share of a process: from its option, and from the environment of launchers", "[job]") {
     CHECK(parse_worker_share("2/3").index == 2);
     CHECK(parse_worker_share("2/3").count == 3);
     for (const char* wrong : {"0/3", "4/3", "1", "/", "1/", "/2", "1/2/3", "-1/2", "1/0", "a/b", "", "1/99999999999"})
         CHECK_THROWS_AS(parse_worker_share(wrong), Error);
     using Environment = std::map<std::string, std::string>;
     const auto share = [](const Environment& variables) {
-        return launcher_share([&](const char* name) -> const char* {
+        return launched([&](const char* name) -> const char* {
             const auto entry = variables.find(name);
             return entry == variables.end() ? nullptr : entry->second.c_str();
         });
     };
-    const auto is = [](const std::optional<WorkerShare>& found, std::uint32_t index, std::uint32_t count) {
-        return found && found->index == index && found->count == count;
+    const auto is = [](const std::optional<Launched>& found, std::uint32_t index, std::uint32_t count) {
+        return found && found->share.index == index && found->share.count == count && !found->from.empty();
     };
     CHECK_FALSE(share({}));
     CHECK(is(share({{"SLURM_ARRAY_TASK_ID", "0"}, {"SLURM_ARRAY_TASK_COUNT", "4"}, {"SLURM_ARRAY_TASK_MIN", "0"}}), 1,
@@ -155,6 +159,25 @@ TEST_CASE("Worker share of a process: from its option, and from the environment 
                     {"OMPI_COMM_WORLD_RANK", "1"},
                     {"OMPI_COMM_WORLD_SIZE", "4"}}),
              6, 12));
+    // A step within an array; an mpirun within a step, whose helpers are Slurm's ranks.
+    CHECK(is(share({{"SLURM_JOB_ID", "5"},
+                    {"SLURM_ARRAY_TASK_ID", "2"},
+                    {"SLURM_ARRAY_TASK_COUNT", "3"},
+                    {"SLURM_ARRAY_TASK_MIN", "1"},
+                    {"SLURM_STEP_ID", "0"},
+                    {"SLURM_PROCID", "0"},
+                    {"SLURM_STEP_NUM_TASKS", "2"}}),
+             3, 6));
+    CHECK(is(share({{"SLURM_STEP_ID", "0"},
+                    {"SLURM_PROCID", "1"},
+                    {"SLURM_NTASKS", "2"},
+                    {"PMI_RANK", "5"},
+                    {"PMI_SIZE", "8"}}),
+             6, 8));
+    // One process alone makes the whole table: also a batch script, which has a SLURM_PROCID.
+    CHECK_FALSE(share({{"PMI_RANK", "0"}, {"PMI_SIZE", "1"}}));
+    CHECK_FALSE(share({{"SLURM_JOB_ID", "5"}, {"SLURM_PROCID", "0"}, {"SLURM_NTASKS", "16"}}));
+    CHECK_THROWS_AS(share({{"PMIX_RANK", "0"}}), Error);
     CHECK_THROWS_AS(share({{"SLURM_ARRAY_TASK_ID", "1"}}), Error);
     CHECK_THROWS_AS(
         share({{"SLURM_ARRAY_TASK_ID", "9"}, {"SLURM_ARRAY_TASK_COUNT", "3"}, {"SLURM_ARRAY_TASK_MIN", "1"}}), Error);
@@ -203,8 +226,7 @@ TEST_CASE("A slice file returns what was written, and any changed byte, truncati
     const SliceFolder foreign(folder / "t.h5.shards", another);
     const std::string text = complaint([&] { (void)foreign.read(id, why); });
     CHECK(contains(text, file));
-    CHECK(contains(text, hex(configuration_hash(another))));
-    CHECK(contains(text, hex(configuration_hash(solver.plan()))));
+    CHECK(contains(text, fmt::format("--seed: expected {}, found {}", seed.seed, small_request().seed)));
     CHECK(configuration_hash(read_configuration(slices.path())) == configuration_hash(solver.plan()));
     SliceFolder second(folder / "t.h5.shards", solver.plan());
     CHECK(contains(complaint([&] { second.open(false); }), "at work"));
@@ -222,12 +244,13 @@ TEST_CASE("A job leaves only its file, and an interrupted one resumes from its s
 
     Request other = request;
     other.seed = 3;
-    CHECK(contains(complaint([&] { run(other, output, true); }), output + ": expected configuration "));
+    CHECK(contains(complaint([&] { run(other, output, true); }),
+                   output + ": it belongs to another job: --seed: expected 3"));
     std::filesystem::remove(output);
 
     run(request, output, false, WorkerShare{1, 2});  // as an interrupted run would leave it: about half
     CHECK(contains(complaint([&] { run(request, output); }), "--resume"));
-    CHECK(contains(complaint([&] { run(other, output, true); }), "expected configuration"));
+    CHECK(contains(complaint([&] { run(other, output, true); }), "another job: --seed: expected 3"));
     const SliceId first = share_of(request, slices_of(plan_of(request)), {1, 2}).front();
     const Tables plan = plan_of(request);
     const std::string file = SliceFolder(shards, plan).file_of(first);

@@ -10,6 +10,9 @@
 #include "tables/error.hpp"
 #include "tables/job/budget.hpp"
 #include "tables/parallel.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/job_difference.hpp"
+#include "tables/streams.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -23,7 +26,7 @@ constexpr unsigned seconds_of_grace = 5;
 /// What a signal handler may do: say it and end. Slices are on disk or not, so nothing is left half done.
 [[noreturn]] void give_up() {
     constexpr char text[] = "medulla-precompute: interrupted: slices in work given up; go on with --resume\n";
-    if (::write(STDERR_FILENO, text, sizeof text - 1) < 0) ::_exit(1);
+    message(STDERR_FILENO, text, sizeof text - 1);
     ::_exit(128 + caught);
 }
 
@@ -60,10 +63,11 @@ class Interrupts {
 std::optional<Tables> finished(const Job& job, const Tables& plan) {
     if (!std::filesystem::exists(job.output)) return std::nullopt;
     Tables tables = read_tables(job.output);
-    const Digest expected = configuration_hash(plan), found = configuration_hash(tables);
-    if (expected != found)
-        throw Error("{}: expected configuration {}, found {}: it belongs to another job", job.output, hex(expected),
-                    hex(found));
+    if (configuration_hash(plan) != configuration_hash(tables)) {
+        const std::string difference = job_difference(plan, tables);
+        throw Error("{}: it belongs to another job: {}", job.output,
+                    difference.empty() ? "expected the options of this job, found others" : difference);
+    }
     return tables;
 }
 
@@ -139,8 +143,9 @@ Tables assemble(const SliceFolder& folder, const Tables& plan) {
 
 JobReport run_job(const Job& job) {
     const Interrupts interrupts;
-    if (std::filesystem::is_directory(job.output))
-        throw Error("{}: expected the name of a file, found a folder", job.output);
+    const Output output(job.output, job.inputs);
+    output.require_plain();  // slices are kept beside it
+    check_name(SliceFolder::beside(job.output));
     const SliceSolver solver(job.request);
     const Tables& plan = solver.plan();
     SliceFolder folder(SliceFolder::beside(job.output), plan);
@@ -177,7 +182,7 @@ JobReport run_job(const Job& job) {
         }
         report.tables = assemble(folder, plan);
         interrupted_if_asked(folder, slices);
-        write_tables(job.output, report.tables, job.compression, folder.scratch());
+        write_tables(output, report.tables, job.compression, folder.scratch());
     } catch (const Interrupted&) {
         throw;
     } catch (const Error& error) {

@@ -15,6 +15,7 @@ namespace medulla::tables {
 struct Job {
     Request request;
     std::string output;
+    std::vector<std::string> inputs;  ///< files that the request was read from: the output is none of them
     bool resume = false;
     std::optional<WorkerShare> share;  ///< a worker: solves its share and writes slice files only
     ProgressMode progress = ProgressMode::automatic;

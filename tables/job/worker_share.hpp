@@ -1,7 +1,6 @@
-// The slices of one worker among many: `--shard I/N`, or what a cluster's launcher says.
+// The slices of one worker among many, as given by `--shard I/N`.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 
@@ -18,12 +17,9 @@ struct WorkerShare {
 /// lowest index). The shares of all workers are disjoint and together everything.
 std::vector<SliceId> share_of(const Request& request, const std::vector<SliceId>& slices, WorkerShare share);
 
-/// "I/N", 1 <= I <= N. Throws Error that names --shard.
-WorkerShare parse_worker_share(const std::string& text);
+inline constexpr std::uint32_t most_workers = 1000000;
 
-/// The share that a cluster's launcher gives this process: a Slurm array task (SLURM_ARRAY_TASK_ID, _COUNT, _MIN,
-/// _STEP), else an Open MPI rank (OMPI_COMM_WORLD_RANK, _SIZE), else none. Both at once: rank within task.
-/// @param variable value of an environment variable, or null   @throws Error that names the variable
-std::optional<WorkerShare> launcher_share(const std::function<const char*(const char*)>& variable);
+/// "I/N", 1 <= I <= N <= most_workers. Throws Error that names --shard.
+WorkerShare parse_worker_share(const std::string& text);
 
 }  // namespace medulla::tables

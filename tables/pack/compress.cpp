@@ -1,4 +1,5 @@
 #include "tables/pack/compress.hpp"
+#include "tables/store/json_text.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -382,7 +383,7 @@ std::string provenance(const Tables& tables, const CompressOptions& options, con
         fit["relative_l2"] = report.fit_error;
         fit["input_noise"] = report.noise;
     }
-    return json.dump();
+    return json_line(json);
 }
 
 std::pair<float, float> range_of(const Part& part, const Tables& tables) {

@@ -364,11 +364,12 @@ std::unique_ptr<Source> open_source(const std::string& path) {
 }
 
 std::vector<unsigned char> read_pack(const std::string& path, bool or_tables) {
+    constexpr std::uint64_t greatest_pack = std::uint64_t{1} << 32;  // its offsets have 32 bits
     if (path == "default") {
         const auto* bytes = reinterpret_cast<const unsigned char*>(default_pack_words);
         return {bytes, bytes + default_pack_size};
     }
-    std::vector<unsigned char> bytes = read_file(path);
+    std::vector<unsigned char> bytes = read_file(path, greatest_pack);
     const OpenResult opened = open_pack(bytes.data(), bytes.size());
     if (opened.status != PackStatus::ok)
         throw Error("{}: expected a {}pack of version {}: {}", path, or_tables ? "tables file (HDF5) or a " : "",

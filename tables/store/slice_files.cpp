@@ -14,7 +14,9 @@
 
 #include "tables/error.hpp"
 #include "tables/store/file.hpp"
+#include "tables/store/job_difference.hpp"
 #include "tables/store/json_text.hpp"
+#include "tables/streams.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -48,6 +50,13 @@ std::vector<std::string> names_in(const std::string& folder) {
     return names;
 }
 
+/// Removes a file of ours; what is no plain file is not.
+void remove_plain(const std::string& file) {
+    struct stat info = {};
+    if (::lstat(file.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) return;
+    if (::unlink(file.c_str()) != 0 && errno != ENOENT) note("{}: cannot be removed: {}\n", file, std::strerror(errno));
+}
+
 struct Inspected {
     std::vector<unsigned char> bytes;
     SliceFileHeader header = {};
@@ -59,12 +68,6 @@ struct Inspected {
         return digest;
     }
 };
-
-void refuse_other(const std::string& file, const Digest& found, const Digest& expected) {
-    if (found != expected)
-        throw Error("{}: expected configuration {}, found {}: it belongs to another job", file, hex(expected),
-                    hex(found));
-}
 
 /// Reads a shard of whatever configuration and checks that it is what was written.
 Inspected inspect(const std::string& path) {
@@ -114,19 +117,24 @@ std::vector<std::string> SliceFolder::files() const {
 }
 
 void SliceFolder::open(bool alone) {
+    struct stat info = {};
     if (::mkdir(path_.c_str(), 0777) == 0)
         sync_folder(folder_of(path_));
     else if (errno != EEXIST)
         throw Error("{}: cannot be made: {}", path_, std::strerror(errno));
+    else if (::stat(path_.c_str(), &info) == 0 && !S_ISDIR(info.st_mode))
+        throw Error("{}: expected a folder, found a {}", path_, kind_name(info.st_mode));
     lock_ = ::open((path_ + "/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (lock_ < 0) throw Error("{}/lock: cannot be written: {}", path_, std::strerror(errno));
-    // A file system without locks (ENOLCK, EOPNOTSUPP) is no reason not to work on it.
-    if (::flock(lock_, (alone ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-        throw Error("{}: another medulla-precompute is at work on it", path_);
+    if (::flock(lock_, (alone ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0) {
+        if (errno == EWOULDBLOCK) throw Error("{}: another medulla-precompute is at work on it", path_);
+        // A file system without locks (ENOLCK, ENOSYS, EOPNOTSUPP) is no reason not to work on it.
+        note("{}: this file system has no locks ({}): start no second run there\n", path_, std::strerror(errno));
+    }
     alone_ = alone;
     if (alone)
         for (const std::string& name : names_in(path_))
-            if (is_temporary(name)) ::unlink((path_ + "/" + name).c_str());
+            if (is_temporary(name)) remove_plain(path_ + "/" + name);
 
     const std::string json = path_ + "/configuration.json";
     if (fs::exists(json)) {
@@ -136,11 +144,23 @@ void SliceFolder::open(bool alone) {
         // Its shards say whose the folder is; without any, a whole run takes it over.
         for (const std::string& file : files()) {
             const Inspected found = inspect(file);
-            if (found.damage.empty()) refuse_other(file, found.configuration(), configuration_);
+            if (found.damage.empty()) refuse_other(file, found.configuration());
         }
-        if (!alone) refuse_other(json, sha256(text), configuration_);
+        if (!alone) refuse_other(json, sha256(text));
     }
     write_file(json, configuration_text_);
+}
+
+void SliceFolder::refuse_other(const std::string& file, const Digest& found) const {
+    if (found == configuration_) return;
+    std::string difference;
+    try {
+        const Tables other = read_configuration(path_);
+        if (configuration_hash(other) == found) difference = job_difference(plan_, other);
+    } catch (const Error&) {  // then nothing is left that names that job's options
+    }
+    if (difference.empty()) difference = "expected the options of this job, found others";
+    throw Error("{}: it belongs to another job: {}", file, difference);
 }
 
 std::optional<Slice> SliceFolder::read(const SliceId& id, std::string& why) const {
@@ -149,7 +169,7 @@ std::optional<Slice> SliceFolder::read(const SliceId& id, std::string& why) cons
     why = found.damage;
     if (!why.empty()) return std::nullopt;
     const SliceFileHeader& header = found.header;
-    refuse_other(file, found.configuration(), configuration_);
+    refuse_other(file, found.configuration());
     const Table& table = plan_.at(id.table);
     Slice slice(slice_cells(table), table.bins());
     const std::size_t size = sizeof header + slice.cells * (4 * sizeof(double) + slice.bins * sizeof(float)) + 32;
@@ -177,7 +197,7 @@ std::vector<bool> SliceFolder::kept(const std::vector<SliceId>& ids) const {
         if (!std::binary_search(there.begin(), there.end(), file)) continue;
         std::string why;
         good[i] = read(ids[i], why).has_value();
-        if (!good[i]) fmt::print(stderr, "{}: damaged ({}); solving it again\n", file, why);
+        if (!good[i]) note("{}: damaged ({}); solving it again\n", file, why);
     }
     return good;
 }
@@ -208,10 +228,12 @@ void SliceFolder::write(const SliceId& id, const Slice& slice) const {
 void SliceFolder::remove() {
     for (const std::string& name : names_in(path_))
         if (ends_with(name, suffix) || is_temporary(name) || name == "configuration.json" || name == "lock")
-            if (::unlink((path_ + "/" + name).c_str()) != 0 && errno != ENOENT)
-                throw Error("{}/{}: cannot be removed: {}", path_, name, std::strerror(errno));
-    if (::rmdir(path_.c_str()) != 0 && errno != ENOENT)
-        throw Error("{}: cannot be removed: {}", path_, std::strerror(errno));
+            remove_plain(path_ + "/" + name);
+    // NFS keeps a file that is open under another name, until it is closed.
+    if (lock_ >= 0) ::close(std::exchange(lock_, -1));
+    const bool kept = ::rmdir(path_.c_str()) != 0 && errno != ENOENT && errno != ENOTEMPTY && errno != EEXIST;
+    if (kept && errno != ENOTDIR)  // a symbolic link to the folder
+        note("{}: cannot be removed: {}\n", path_, std::strerror(errno));
 }
 
 void SliceFolder::remove_if_empty() {

@@ -58,12 +58,16 @@ class SliceFolder {
     /// A name inside the folder for the tables file in work: the folder's removal takes it along.
     std::string scratch() const;
 
-    /// Removes everything of ours and the folder. What is not ours keeps it there.
+    /// Removes everything of ours and the folder. What is not ours keeps it there; what cannot be removed is told on
+    /// standard error, since the job is done.
     void remove();
     /// Removes the folder if it keeps no slice and nobody else works on it.
     void remove_if_empty();
 
   private:
+    /// Throws Error that says in which options the job of `file`, of configuration `found`, is another one.
+    void refuse_other(const std::string& file, const Digest& found) const;
+
     std::string path_;
     const Tables& plan_;
     std::string configuration_text_;

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tables/error.hpp"
+#include "tables/store/json_text.hpp"
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "shards and hashes are little-endian, copied as they lie");
 
@@ -67,10 +68,10 @@ std::string describe(const Tables& plan, const SliceId& id) {
 }
 
 std::string configuration_text(const Tables& plan) {
-    nlohmann::ordered_json json = {{"program", plan.program}};
+    nlohmann::ordered_json json = {{"program", json_name(plan.program)}};
     for (const Table* table : plan.present()) {
         nlohmann::ordered_json& out = json["tables"][table->name()];
-        out["method"] = table->method;
+        out["method"] = json_name(table->method);
         out["seed"] = table->seed;
         out["paths"] = table->paths;
         // Only where they are set: a job without them keeps its text.

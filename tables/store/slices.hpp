@@ -11,6 +11,9 @@
 
 namespace medulla::tables {
 
+/// Most numbers in the lobes of one slice, which is one chunk of the tables file.
+inline constexpr std::size_t most_slice_values = 4096 * 4096;
+
 /// Place of a slice: indices into the table's sigma and g axes.
 struct SliceId {
     TableId table = TableId::azimuthal;

@@ -1,4 +1,4 @@
-// libFuzzer: bytes -> open_pack -> everything that a renderer does with a pack, all finite. The checksum is mended in
+// libFuzzer: bytes -> open_pack -> everything that a renderer does with a pack, all finite. The checksum is corrected in
 // half of the inputs (by their first byte), so that the checks behind it are reached.
 #include <cstdio>
 #include <cstdlib>

@@ -275,7 +275,7 @@ Counts mutate_packs(std::uint64_t count, std::uint64_t seed) {
     options.spans = {8, 8, 8};
     Bytes good = compress(simulate(small_request(), ProgressMode::none), options, "mutate").pack;
     Counts counts;
-    std::uint64_t mended = 0, mended_opened = 0;
+    std::uint64_t corrected = 0, corrected_opened = 0;
     for (std::uint64_t i = 0; i < count; ++i, ++counts.read) {
         Random random(seed * 0x9e3779b97f4a7c15u + i);
         Bytes bytes = mutate(good, random);
@@ -289,7 +289,7 @@ Counts mutate_packs(std::uint64_t count, std::uint64_t seed) {
             if (random() % 4) std::memcpy(bytes.data() + offsetof(PackHeader, byte_count), &size, sizeof size);
             const std::uint64_t sum = pack_checksum(bytes.data(), bytes.size());
             std::memcpy(bytes.data() + offsetof(PackHeader, checksum), &sum, sizeof sum);
-            ++mended;
+            ++corrected;
         }
         // Of exactly its size, so that a sanitizer sees the first byte past the end.
         const Bytes exact(bytes);
@@ -303,14 +303,14 @@ Counts mutate_packs(std::uint64_t count, std::uint64_t seed) {
             fmt::print("number {} of seed {}: not finite, or below 0: {}\n", i, seed, wrong);
         }
         if (mend) {
-            ++mended_opened, ++counts.same;
+            ++corrected_opened, ++counts.same;
         } else {
             ++counts.silent;
             fmt::print("number {} of seed {}: silent difference\n", i, seed);
         }
     }
-    fmt::print("packs: {} had their checksum corrected, of these {} opened and were evaluated and sampled\n", mended,
-               mended_opened);
+    fmt::print("packs: {} had their checksum corrected, of these {} opened and were evaluated and sampled\n", corrected,
+               corrected_opened);
     return counts;
 }
 

@@ -1,6 +1,7 @@
 // furtable plot and furtable export: figures of lobes; packs and tables in the formats of other programs.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -22,8 +23,9 @@ struct PlotArguments {
 
 /// Parses "SIGMA:G"; throws UsageError.
 PlotPoint plot_point(const std::string& text) {
-    const std::size_t colon = std::min(text.find(':'), text.size() - 1);
-    const auto sigma = parse_number<double>(text.substr(0, colon)), g = parse_number<double>(text.substr(colon + 1));
+    const std::size_t colon = std::min(text.find(':'), text.size());
+    const auto sigma = parse_number<double>(text.substr(0, colon)),
+               g = parse_number<double>(text.substr(std::min(colon + 1, text.size())));
     if (!sigma || !g) throw UsageError("plot: --at expected SIGMA:G, such as 2:0.7, found '{}'", text);
     return {*sigma, *g};
 }

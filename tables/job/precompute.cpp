@@ -26,7 +26,7 @@ constexpr unsigned seconds_of_grace = 5;
 /// Ends the process from a signal handler, with a message. Slice files are complete or absent, so nothing is left half
 /// written.
 [[noreturn]] void give_up() {
-    constexpr char text[] = "medulla-precompute: interrupted: slices in work given up; go on with --resume\n";
+    constexpr char text[] = "medulla-precompute: interrupted: unfinished slices discarded; continue with --resume\n";
     message(STDERR_FILENO, text, sizeof text - 1);
     ::_exit(128 + caught);
 }
@@ -123,7 +123,7 @@ std::size_t count_kept(const SliceFolder& folder, const std::vector<SliceId>& sl
 
 void throw_if_interrupted(const SliceFolder& folder, const std::vector<SliceId>& slices) {
     if (stop)
-        throw Interrupted(caught, "interrupted: {} of {} slices kept in {}; go on with --resume",
+        throw Interrupted(caught, "interrupted: {} of {} slices kept in {}; continue with --resume",
                           count_kept(folder, slices), slices.size(), folder.path());
 }
 
@@ -167,13 +167,13 @@ JobReport run_job(const Job& job) {
             return report;
         }
     if (!job.resume && !job.share && !folder.files().empty())
-        throw Error("{}: holds slices of an earlier run; go on with --resume, or delete it", folder.path());
+        throw Error("{}: contains slices of an earlier run; continue with --resume, or delete it", folder.path());
     folder.open(!job.share);
     try {
         const std::vector<bool> kept = folder.kept(slices);
         report.kept = static_cast<std::size_t>(std::count(kept.begin(), kept.end(), true));
         if (job.share && !job.resume && report.kept > 0)
-            throw Error("{}: holds {} of this worker's {} slices already; go on with --resume, or delete it",
+            throw Error("{}: already contains {} of this worker's {} slices; continue with --resume, or delete it",
                         folder.path(), report.kept, slices.size());
         solve(job, solver, folder, slices, kept);
         throw_if_interrupted(folder, slices);
@@ -190,7 +190,7 @@ JobReport run_job(const Job& job) {
         const std::size_t count = count_kept(folder, slices);
         folder.remove_if_empty();
         if (count == 0 || job.share) throw;
-        throw Error("{}; {} of {} slices kept in {}, go on with --resume", error.what(), count, slices.size(),
+        throw Error("{}; {} of {} slices kept in {}, continue with --resume", error.what(), count, slices.size(),
                     folder.path());
     }
     folder.remove();

@@ -37,7 +37,7 @@ std::uint64_t cell_key(std::uint64_t kind, std::initializer_list<double> paramet
 /// Stores a solved cell, its lobe as floats.
 void store(Slice& slice, std::size_t cell, const sim2d::Profile& profile) {
     if (profile.lobe.size() != slice.bins) throw Error("cell {}: the solver returned no lobe", cell);
-    if (!(profile.standard_error >= 0)) throw Error("cell {}: the solver knows no error", cell);
+    if (!(profile.standard_error >= 0)) throw Error("cell {}: the solver gave no error", cell);
     for (std::size_t b = 0; b < slice.bins; ++b)
         slice.lobe[cell * slice.bins + b] = static_cast<float>(profile.lobe[b]);
     slice.energy[cell] = profile.energy;

@@ -322,7 +322,7 @@ void run_verify(const VerifyArguments& args) {
             {"degeneracy", degeneracy}};
         if (args.json || error) continue;
         if (found.cells)
-            print("{}: ok: SHA-256, {} finite and >= 0, integrals, energies and symmetry as they must be\n", file,
+            print("{}: ok: SHA-256, {} finite and >= 0, with correct integrals, energies and symmetry\n", file,
                   counted(*found.cells, "cell"));
         else
             print(

@@ -1,5 +1,5 @@
-// libFuzzer: bytes -> open_pack -> everything that a renderer does with a pack, all finite. The checksum is corrected in
-// half of the inputs (by their first byte), so that the checks behind it are reached.
+// libFuzzer: bytes -> open_pack -> everything that a renderer does with a pack, all finite. The checksum is corrected
+// in half of the inputs (by their first byte), so that the checks behind it are reached.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>

@@ -223,7 +223,8 @@ const Tables& smallest_tables() {
 
 }  // namespace
 
-TEST_CASE("A pack has no more components than its table can have, or than the error of its exit splines justifies", "[compress]") {
+TEST_CASE("A pack has no more components than its table can have, or than the error of its exit splines justifies",
+          "[compress]") {
     for (const std::size_t bytes : {20000u, 40000u, 153600u, 100000000u}) {
         CAPTURE(bytes);
         CompressOptions options;
@@ -237,7 +238,8 @@ TEST_CASE("A pack has no more components than its table can have, or than the er
                 // A part at its most components needs no solve.
                 CHECK(part.solve.iterations <= 300);
             }
-            // At most_rank only the error of the exit splines is left; below it, components add at most a quarter of that.
+            // At most_rank only the error of the exit splines is left; below it, components add at most a quarter of
+            // that.
             if (is_lobe(report.kind) && bytes >= 40000)
                 CHECK(components <= 1.5 * report.exit_error * report.exit_error / 16);
         }

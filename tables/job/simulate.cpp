@@ -76,7 +76,8 @@ auto count_until(const Goal& goal, Trace&& trace) {
         if (ratio <= 1) return counted;
         // An error estimate from few counts is rough: at most 64 times as many at once.
         const double wanted = std::clamp(1.05 * ratio * ratio, 2.0, 64.0) * static_cast<double>(paths);
-        paths = static_cast<std::uint64_t>(std::min(static_cast<double>(goal.paths), wanted));  // if wanted is NaN, goal.paths
+        paths = static_cast<std::uint64_t>(
+            std::min(static_cast<double>(goal.paths), wanted));  // if wanted is NaN, goal.paths
     }
 }
 

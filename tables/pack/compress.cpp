@@ -27,8 +27,8 @@ int energy_rank(const Part& part, const CompressOptions& options) {
     const double room = static_cast<double>(*options.max_bytes) / 17 / part.component_bytes(usual_bits);
     return std::min(std::max(static_cast<int>(std::min<double>(room, most) / rank_step) * rank_step, rank_step), most);
 }
-/// Rank of the pilot solves, which measure how hard each part is: below the most that a part can have, where no error is
-/// left to measure.
+/// Rank of the pilot solves, which measure how hard each part is: below the most that a part can have, where no error
+/// is left to measure.
 int pilot_rank(const Part& part) { return std::clamp(part.most_rank() / 2, 1, 32); }
 /// Bytes reserved for the provenance text while components are distributed; bits get what it does not use.
 constexpr std::size_t text_room = 800;
@@ -170,7 +170,8 @@ std::size_t pack_bytes(const Solves& solves, double bits) {
 }
 
 /// Rank beyond which a solve no longer reduces the error of its kind: there its error is a quarter of that of the exit
-/// splines, which raises the root of the sum of their squares by 3 %. A multiple of 8, or the most that the part can have.
+/// splines, which raises the root of the sum of their squares by 3 %. A multiple of 8, or the most that the part can
+/// have.
 int most_useful(const Solves& solves, const Solve& solve) {
     double exit = 0, parts = 0;
     for (const Solve& other : solves)

@@ -13,8 +13,6 @@
 
 #include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
-#include "sim2d/disc/single.hpp"
-#include "sim2d/slab/single.hpp"
 #include "tables/error.hpp"
 #include "tables/pack/spline.hpp"
 #include "tables/parallel.hpp"
@@ -354,8 +352,8 @@ bool Source::absorbs() const {
 }
 
 double energy_of(const Source& source, TableKind kind, const Parameters& at) {
-    if (kind == TableKind::azimuthal) return sim2d::disc_energy(at.sigma, at.h) * source.survival(at);
-    const double back = source.back_fraction(at), total = sim2d::slab_energy(at.sigma, at.theta_i);
+    if (kind == TableKind::azimuthal) return azimuthal_energy(at.sigma, at.h) * source.survival(at);
+    const double back = source.back_fraction(at), total = longitudinal_energy(at.sigma, at.theta_i);
     return total * (kind == TableKind::longitudinal_back ? back : 1 - back);
 }
 

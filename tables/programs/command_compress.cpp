@@ -46,10 +46,10 @@ std::string distance_of(const CompressResult& result, int rank) {
     });
     return fmt::format("rank {} is {:.1e} (relative L2) from the table, in its {} lobes; ", rank, worst.relative,
                        name_of(worst.kind)) +
-           (nearer
-                ? fmt::format("--max-bytes {}, the size of the built-in pack, takes more components and is more accurate",
-                              default_bytes)
-                : "more components do not help: the error left is that of the exit splines");
+           (nearer ? fmt::format(
+                         "--max-bytes {}, the size of the built-in pack, takes more components and is more accurate",
+                         default_bytes)
+                   : "more components do not help: the error left is that of the exit splines");
 }
 
 nlohmann::ordered_json report_json(const TableReport& report) {

@@ -133,17 +133,17 @@ struct VerifyArguments {
     bool json = false;
 };
 
-// The limits of verify follow from the relative L2 error e that the provenance of a pack states for each kind: the values
-// of a table lie in a known range, so an excess of the pack over that range is part of its error.
+// The limits of verify follow from the relative L2 error e that the provenance of a pack states for each kind: the
+// values of a table lie in a known range, so an excess of the pack over that range is part of its error.
 
 /// For a pack that states no error.
 constexpr double unstated_error = 1e-2;
 /// Limits of the negative undershoot over the lobe's integral. Measured on packs of ranks 1 to 32 of tables with
-/// 4 x 3 x 4 and 10 x 6 x 8 nodes: at most 1.7 times the greatest e of the kind, or more than most_undershoot, where the
-/// factors no longer represent a density.
+/// 4 x 3 x 4 and 10 x 6 x 8 nodes: at most 1.7 times the greatest e of the kind, or more than most_undershoot, where
+/// the factors no longer represent a density.
 constexpr double undershoot_per_error = 4, most_undershoot = 0.5;
-/// The error of one of N shares is at most e times the root of the sum of their squares, e sqrt(N), plus rounding. It is
-/// less than most_share_excess / 5 in every pack that the tests write.
+/// The error of one of N shares is at most e times the root of the sum of their squares, e sqrt(N), plus rounding. It
+/// is less than most_share_excess / 5 in every pack that the tests write.
 constexpr double share_rounding = 1e-4, most_share_excess = 0.05;
 
 double stated_error(const PackView& pack, TableKind kind) { return stated(pack, kind, "relative_l2", unstated_error); }
@@ -268,9 +268,10 @@ void verify_pack(const PackView& pack, const Source& source, const std::string& 
         const double stated = stated_error(pack, kind), undershoot = largest_undershoot(pack, source, kind);
         const double limit = max_undershoot.value_or(std::min(undershoot_per_error * stated, most_undershoot));
         if (!(undershoot <= limit))
-            throw Error("{}: {} lobes: expected integral 1 with a negative undershoot of at most {:.2e}{}, found {:.2e}",
-                        path, name_of(kind), limit,
-                        max_undershoot ? "" : fmt::format(" (the pack states an error of {:.1e})", stated), undershoot);
+            throw Error(
+                "{}: {} lobes: expected integral 1 with a negative undershoot of at most {:.2e}{}, found {:.2e}", path,
+                name_of(kind), limit,
+                max_undershoot ? "" : fmt::format(" (the pack states an error of {:.1e})", stated), undershoot);
         found.undershoot = std::max(*found.undershoot, undershoot);
     }
 }

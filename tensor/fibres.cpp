@@ -1,6 +1,5 @@
 // CP without a solve: as many components as any tensor of the shape can need. Uses hosvd.hpp.
 #include <algorithm>
-#include <chrono>
 
 #include "tensor/als.hpp"
 #include "tensor/hosvd.hpp"
@@ -46,14 +45,9 @@ Factors fibres(const Tensor& core, std::size_t longest) {
 }  // namespace
 
 CpResult cp_fibres(const Tensor& tensor, bool nonnegative) {
-    const auto begin = std::chrono::steady_clock::now();
-    const Normalised input(tensor);
-    CpResult result;
-    if (input.norm() == 0) {
-        CpOptions options;
-        options.rank = 1;
-        result = zero_result(tensor.shape, options);
-    } else {
+    CpOptions options;
+    options.rank = 1;  // for the zero tensor
+    return solved(tensor, options, "fibres", [&](const Normalised& input, CpResult& result) {
         const Hosvd hosvd = nonnegative ? whole(input.tensor()) : truncated_hosvd(input.tensor(), finest_truncation);
         const std::vector<std::size_t>& shape = hosvd.core.shape;
         const auto longest = static_cast<std::size_t>(std::max_element(shape.begin(), shape.end()) - shape.begin());
@@ -66,10 +60,7 @@ CpResult cp_fibres(const Tensor& tensor, bool nonnegative) {
         store(fit, input, shape, result);
         result.report.truncation_error = hosvd.error;
         result.report.relative_error = relative_error(tensor, result.model);
-    }
-    result.report.solver = "fibres";
-    result.report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    return result;
+    });
 }
 
 }  // namespace medulla::tensor

@@ -18,6 +18,8 @@ import tempfile
 import time
 import unittest
 
+from support.runs import CLEAN, sanitized
+
 BIN = os.path.abspath(sys.argv[1])
 KILLS = int(os.environ.get("MEDULLA_KILLS", "40"))
 SIZES = int(os.environ.get("MEDULLA_SIZES", "12"))
@@ -28,21 +30,9 @@ AXES = ["--sigma-range", "0:4:6", "--g-range", "0:0.6:4", "--h-range", "0:1:3", 
 SMALL = AXES + ["--method", "analog", "--paths", "1500"]
 
 
-def clean_environment():
-    """Without variables of launchers, which would turn every run into a worker."""
-    return {k: v for k, v in os.environ.items() if not k.startswith(("SLURM_", "OMPI_", "PMI", "PALS_", "MV2_", "MVP_", "FLUX_", "JSM_", "ALPS_"))}
-
-
-def sanitized():
-    """Whether the programs are built with a sanitizer, which does not run in the emulator."""
-    with open(os.path.join(BIN, "furtable"), "rb") as f:
-        program = f.read()
-    return b"__asan_init" in program or b"__tsan_init" in program
-
-
 def start(program, *args, environment={}, **options):
     return subprocess.Popen([os.path.join(BIN, program), *map(str, args)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                            text=True, env=dict(clean_environment(), **environment), **options)
+                            text=True, env=dict(CLEAN, **environment), **options)
 
 
 def run(program, *args, **options):
@@ -187,7 +177,7 @@ class Nothing(unittest.TestCase):
         """docs/robustness.md: without AVX2 and FMA glibc selects other code for exp, log and sin. The programs' own loops
         select by processor, so they run on an emulated Nehalem (SSE4.2) if qemu-user is installed."""
         plain = dict(GLIBC_TUNABLES="glibc.cpu.hwcaps=-AVX2,-FMA")
-        emulator = None if sanitized() else shutil.which("qemu-x86_64")
+        emulator = None if sanitized(BIN) else shutil.which("qemu-x86_64")
         small = ["--sigma-range", "0:4:2", "--g-range", "0.3:0.3", "--h-range", "0:1:3", "--theta-range", "0:80:3", "--bins",
                  "36", "--threads", "1", "--progress", "none"]
         for method in (["--method", "analog", "--paths", "3000"], ["--method", "deterministic"]):
@@ -198,7 +188,7 @@ class Nothing(unittest.TestCase):
             if emulator:
                 self.solve("fast.h5", *small, *method)
                 args = [emulator, "-cpu", "Nehalem", os.path.join(BIN, "medulla-precompute"), "-o", self.path("old.h5")]
-                done = subprocess.run([*args, *small, *method], capture_output=True, text=True, env=clean_environment())
+                done = subprocess.run([*args, *small, *method], capture_output=True, text=True, env=CLEAN)
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertEqual(sha(self.path("old.h5")), sha(self.path("fast.h5")), method)
             os.remove(self.path("fast.h5"))

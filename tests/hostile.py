@@ -17,12 +17,12 @@ import unittest
 import h5py
 import numpy
 
+from support.runs import sanitized
+
 BIN = os.path.abspath(sys.argv.pop(1))
 AXES = ["--sigma-range", "0:4:3", "--g-range", "0:0.6:3", "--h-range", "0:1:3", "--theta-range", "0:80:3", "--bins", "36"]
 MEMORY = 3 << 30  # address space of the programs and their libraries, plus what these files may allocate
-with open(os.path.join(BIN, "furtable"), "rb") as f:
-    program = f.read()
-if b"__asan_init" in program or b"__tsan_init" in program:
+if sanitized(BIN):
     MEMORY = None  # a sanitizer maps terabytes
 
 

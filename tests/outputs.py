@@ -16,19 +16,17 @@ import signal
 import stat
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import unittest
 
+from support import runs
+from support.runs import CLEAN, sanitized
+
 BIN, PRELOAD = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
 SMALL = ["--sigma-range", "0:4:2", "--g-range", "0:0.8:2", "--h-range", "0:1:3", "--theta-range", "0:90:3", "--bins", "36",
          "--threads", "1"]
-LAUNCHERS = ("SLURM_", "OMPI_", "PMI", "PALS_", "MV2_", "MVP_", "FLUX_", "JSM_", "ALPS_")
-CLEAN = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHERS)}
-with open(os.path.join(BIN, "furtable"), "rb") as program:
-    text = program.read()
-SANITIZED = b"__asan_init" in text or b"__tsan_init" in text
+SANITIZED = sanitized(BIN)
 
 
 def digest(path):
@@ -36,27 +34,8 @@ def digest(path):
         return hashlib.sha256(f.read()).hexdigest()
 
 
-class Outputs(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.made = tempfile.TemporaryDirectory()
-        good = os.path.join(cls.made.name, "t.h5")
-        assert subprocess.run([BIN + "/medulla-precompute", "-o", good, *SMALL], capture_output=True, env=CLEAN).returncode == 0
-        assert subprocess.run([BIN + "/furtable", "compress", good, "--rank", "4", "--solver", "als"],
-                              capture_output=True).returncode == 0
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.made.cleanup()
-
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.path = lambda name: os.path.join(self.folder.name, name)
-        for name in ("t.h5", "t.furpack"):
-            shutil.copy(os.path.join(self.made.name, name), self.path(name))
-
-    def tearDown(self):
-        self.folder.cleanup()
+class Outputs(runs.WithFiles):
+    bin, job = BIN, SMALL
 
     def run_in(self, program, *args, env={}, timeout=120, **options):
         options = dict(dict(stdout=subprocess.PIPE, stderr=subprocess.PIPE), **options)

@@ -13,44 +13,23 @@ import shutil
 import struct
 import subprocess
 import sys
-import tempfile
 import unittest
 
 import h5py
 import numpy
 
+from support import runs
+from support.runs import CLEAN
+
 BIN, INCLUDE = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
 SMALL = ["--sigma-range", "0:4:2", "--g-range", "0:0.8:2", "--h-range", "0:1:3", "--theta-range", "0:90:3", "--bins", "36",
          "--threads", "1", "--progress", "none"]
-LAUNCHERS = ("SLURM_", "OMPI_", "PMI", "PALS_", "MV2_", "MVP_", "FLUX_", "JSM_", "ALPS_")
-CLEAN = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHERS)}
 TABLES = {"azimuthal": ["sigma", "g", "h", "phi"], "longitudinal": ["sigma", "g", "theta_i", "side", "theta_r"]}
 VALUES = ["lobe", "energy", "energy_error", "standard_error", "mean_length"]
 
 
-class Outsiders(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.made = tempfile.TemporaryDirectory()
-        cls.good = os.path.join(cls.made.name, "t.h5")
-        done = subprocess.run([BIN + "/medulla-precompute", "-o", cls.good, *SMALL, "--compression", "none"],
-                              capture_output=True, env=CLEAN)
-        assert done.returncode == 0, done.stderr
-        assert subprocess.run([BIN + "/furtable", "compress", cls.good, "--rank", "4", "--solver", "als"],
-                              capture_output=True).returncode == 0
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.made.cleanup()
-
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.path = lambda name: os.path.join(self.folder.name, name)
-        for name in ("t.h5", "t.furpack"):
-            shutil.copy(os.path.join(self.made.name, name), self.path(name))
-
-    def tearDown(self):
-        self.folder.cleanup()
+class Outsiders(runs.WithFiles):
+    bin, job = BIN, [*SMALL, "--compression", "none"]
 
     def run_in(self, program, *args, env={}, timeout=120):
         args = [w if isinstance(w, bytes) else str(w) for w in args]

@@ -14,18 +14,20 @@ using namespace medulla::tables;
 
 namespace {
 
-/// Small noise-free versions of both tables.
+/// Both tables with few nodes on the axes of sigma, h and theta_i.
+Tables noise_free(std::size_t nodes, const Range& g, std::size_t bins) {
+    Request request = default_request();
+    request.method = Method::deterministic;
+    request.sigma = graded_axis("sigma", {0, 4, nodes});
+    request.g = graded_axis("g", g);
+    request.h = graded_axis("h", {0, 1, nodes});
+    request.theta_i = graded_axis("theta_i", {0, pi / 2, nodes});
+    request.bins = bins;
+    return simulate(request, ProgressMode::none);
+}
+
 const Tables& small_tables() {
-    static const Tables tables = [] {
-        Request request = default_request();
-        request.method = Method::deterministic;
-        request.sigma = graded_axis("sigma", {0, 4, 6});
-        request.g = graded_axis("g", {0, 0.7, 4});
-        request.h = graded_axis("h", {0, 1, 6});
-        request.theta_i = graded_axis("theta_i", {0, pi / 2, 6});
-        request.bins = 180;
-        return simulate(request, ProgressMode::none);
-    }();
+    static const Tables tables = noise_free(6, {0, 0.7, 4}, 180);
     return tables;
 }
 
@@ -208,16 +210,7 @@ namespace {
 
 /// 4 x 3 x 4 nodes of 36 bins: a part has 48 fibres along its exit axis, and so at most 48 components.
 const Tables& smallest_tables() {
-    static const Tables tables = [] {
-        Request request = default_request();
-        request.method = Method::deterministic;
-        request.sigma = graded_axis("sigma", {0, 4, 4});
-        request.g = graded_axis("g", {0, 0.8, 3});
-        request.h = graded_axis("h", {0, 1, 4});
-        request.theta_i = graded_axis("theta_i", {0, pi / 2, 4});
-        request.bins = 36;
-        return simulate(request, ProgressMode::none);
-    }();
+    static const Tables tables = noise_free(4, {0, 0.8, 3}, 36);
     return tables;
 }
 

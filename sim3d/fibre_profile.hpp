@@ -77,7 +77,7 @@ class FibreProfile {
 
     Estimate energy(Classes classes, std::size_t channel = 0) const;
     Estimate white_energy(Classes classes) const;  ///< had nothing absorbed
-    Estimate lost() const;                         ///< of white energy: paths cut off after 10^5 flights
+    Estimate lost() const;                         ///< of white energy: paths cut off after 10^4 flights
     /// Mean length in cortex or medulla over all light that meets the fibre, had nothing absorbed [radii]: minus the
     /// derivative of the energy by sigma_ca or sigma_ma where both are 0.
     Estimate cortex_length(Classes classes) const;

@@ -20,7 +20,7 @@ struct PathExit {
 /// Follows single paths of one fibre and light. Threads may share it.
 class FibreWalker {
   public:
-    static constexpr std::uint32_t most_flights = 100000;
+    static constexpr std::uint32_t most_flights = 10000;
 
     FibreWalker(const Fibre& fibre, const Light& light);
 

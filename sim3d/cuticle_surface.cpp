@@ -51,13 +51,6 @@ Vec3 refracted(Vec3 d, Vec3 n, double c, double ratio) {
 }
 
 double sample_visible(double mu, RandomStream& random) {
-    if (mu <= -1) {
-        // p = x - mu: x exp(mu x - x^2 / 2), from the Gamma density x exp(mu x).
-        for (;;) {
-            const double x = -portable::log(random.uniform() * random.uniform()) / -mu;
-            if (random.uniform() < portable::exp(-0.5 * x * x)) return x - mu;
-        }
-    }
     if (mu > 0) {
         // p and -p share 2 mu between |p| < mu, in the ratio of mu + p to mu - p; beyond it p > 0 has all.
         const double tail = mu < kOutOfSight ? normal_density(mu) + mu * normal_tail(mu) : 0;
@@ -69,7 +62,18 @@ double sample_visible(double mu, RandomStream& random) {
                 return random.uniform() * 2 * mu < mu + std::abs(p) ? std::abs(p) : -std::abs(p);
             }
     }
-    // Beyond |mu|: (mu + p) exp(-p^2 / 2) from Rayleigh's p exp(-p^2 / 2).
+    return sample_visible_tail(mu, random);
+}
+
+double sample_visible_tail(double mu, RandomStream& random) {
+    if (mu <= -1) {
+        // p = x - mu: x exp(mu x - x^2 / 2), from the Gamma density x exp(mu x).
+        for (;;) {
+            const double x = -portable::log(random.uniform() * random.uniform()) / -mu;
+            if (random.uniform() < portable::exp(-0.5 * x * x)) return x - mu;
+        }
+    }
+    // (mu + p) exp(-p^2 / 2) from Rayleigh's p exp(-p^2 / 2).
     for (;;) {
         const double p = std::sqrt(mu * mu - 2 * portable::log(random.uniform()));
         if (random.uniform() * p * (mu > 0 ? 2 : 1) < mu + p) return p;
@@ -109,7 +113,7 @@ double CuticleSurface::reflectance(Vec3 d, Vec3 n, double c, Side side) const {
     return layered_reflectance(excess_ / cos2, std::min(1.0, outside / std::sqrt(cos2)), layers_);
 }
 
-Vec3 CuticleSurface::facet(Vec3 d, Side side, Vec3 normal, RandomStream& random) const {
+Vec3 CuticleSurface::facet(Vec3 d, Side side, Vec3 normal, bool tail, RandomStream& random) const {
     const double s = static_cast<double>(static_cast<int>(side));
     const Vec3 tangent{0, -normal.z, normal.y};
     // L = -s d . (N + a x + b t) = seen + K p: its slopes' part along k = -s (along d_x, around d_t) is p.
@@ -120,7 +124,8 @@ Vec3 CuticleSurface::facet(Vec3 d, Side side, Vec3 normal, RandomStream& random)
         double p, q, cx = 1, ct = 0;
         if (K > 1e-12) {
             if (seen < -kOutOfSight * K) return normal * s;  // behind the scales: the cylinder itself
-            p = sample_visible(seen / K, random), cx = kx / K, ct = kt / K;
+            p = tail ? sample_visible_tail(seen / K, random) : sample_visible(seen / K, random), cx = kx / K,
+            ct = kt / K;
         } else {
             p = standard_normal(random);
         }
@@ -144,11 +149,12 @@ bool CuticleSurface::leaves(Vec3 d, Side side, Vec3 normal, RandomStream& random
     return random.uniform() * (clear + K * visible_mass(-clear / K)) < clear;
 }
 
-Side CuticleSurface::leave(Vec3& d, Side side, Vec3 normal, RandomStream& random) const {
+Side CuticleSurface::leave(Vec3& d, Side side, Vec3 normal, RandomStream& random, Next next) const {
     constexpr int most = 1000;  // reflections among facets; more than ten are never seen
     for (int i = 0; i < most; ++i) {
-        if (leaves(d, side, normal, random)) return side;
-        const Vec3 n = facet(d, side, normal, random);
+        if (next == Next::leave_or_meet && leaves(d, side, normal, random)) return side;
+        const Vec3 n = facet(d, side, normal, next == Next::meet_tail, random);
+        next = Next::leave_or_meet;
         const double c = -dot(d, n);
         if (!(c > 0)) continue;  // by rounding
         if (random.uniform() < reflectance(d, n, c, side)) {

@@ -33,8 +33,17 @@ enum class Side : int { outside = 1, inside = -1 };
 
 /// A standard normal p weighted with (mu + p)+: density (mu + p)+ exp(-p^2 / 2) / (sqrt(2 pi) (mu Phi(mu) + phi(mu))).
 double sample_visible(double mu, sim2d::RandomStream& random);
+/// The same, given p > |mu|.
+double sample_visible_tail(double mu, sim2d::RandomStream& random);
 /// (mu Phi(mu) + phi(mu)): E[(mu + p)+].
 double visible_mass(double mu);
+
+/// What a direction at the surface does next.
+enum class Next {
+    leave_or_meet,  ///< leaves, or meets a facet
+    meet,           ///< meets a facet
+    meet_tail,      ///< meets a facet of the tail, see sample_visible_tail
+};
 
 class CuticleSurface {
   public:
@@ -43,7 +52,7 @@ class CuticleSurface {
     /// Follows a direction that is at the surface until it leaves it.
     /// @param d unit direction, becomes that in which the light leaves   @param side where d is
     /// @param normal of the fibre there, outward, of unit length and 0 along x   @return where it left to
-    Side leave(Vec3& d, Side side, Vec3 normal, sim2d::RandomStream& random) const;
+    Side leave(Vec3& d, Side side, Vec3 normal, sim2d::RandomStream& random, Next next = Next::leave_or_meet) const;
 
     /// Reflectance at a facet of unit normal n towards `side`, met at the cosine c on that side.
     double reflectance(Vec3 d, Vec3 n, double c, Side side) const;
@@ -55,7 +64,7 @@ class CuticleSurface {
 
   private:
     /// A facet that d meets, its unit normal towards `side`.
-    Vec3 facet(Vec3 d, Side side, Vec3 normal, sim2d::RandomStream& random) const;
+    Vec3 facet(Vec3 d, Side side, Vec3 normal, bool tail, sim2d::RandomStream& random) const;
     bool leaves(Vec3 d, Side side, Vec3 normal, sim2d::RandomStream& random) const;
 
     double eta_, excess_, layers_, tilt_, along_, around_;

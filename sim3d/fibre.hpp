@@ -54,7 +54,7 @@ struct Light {
     double h_low = -1, h_high = 1;  ///< offsets that are lit, in [-1, 1]: equal for one ray, -1 and 1 for the far
                                     ///< field. h is counted along the left normal of the direction of travel, in units
                                     ///< of half the fibre's width as the light sees it
-    double azimuth = 0;  ///< [radians]; a circular fibre does not see it
+    double azimuth = 0;             ///< [radians]; a circular fibre does not see it
 };
 
 /// Work, randomness and bins of one simulation.

@@ -14,9 +14,9 @@
 #include <nlohmann/json.hpp>
 
 #include "medulla/lookup.hpp"
-#include "tables/compress.hpp"
-#include "tables/plot.hpp"
-#include "tables/tables_file.hpp"
+#include "tables/pack/compress.hpp"
+#include "tables/programs/plot.hpp"
+#include "tables/store/tables_file.hpp"
 #include "tensor/hosvd.hpp"
 
 using namespace medulla;

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "sim2d/disc_deterministic.hpp"
-#include "tables/axis.hpp"
+#include "sim2d/disc/deterministic.hpp"
+#include "tables/table/axis.hpp"
 
 using namespace medulla;
 

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "sim2d/analog.hpp"
-#include "sim2d/disc_deterministic.hpp"
-#include "sim2d/slab_deterministic.hpp"
-#include "sim2d/tracer.hpp"
+#include "sim2d/disc/deterministic.hpp"
+#include "sim2d/reference/analog.hpp"
+#include "sim2d/slab/deterministic.hpp"
+#include "sim2d/tracer/tracer.hpp"
 
 namespace medulla::bench {
 

@@ -11,10 +11,10 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "sim2d/disc_deterministic.hpp"
-#include "sim2d/slab_deterministic.hpp"
-#include "tables/request.hpp"
-#include "tables/source.hpp"
+#include "sim2d/disc/deterministic.hpp"
+#include "sim2d/slab/deterministic.hpp"
+#include "tables/job/request.hpp"
+#include "tables/pack/source.hpp"
 
 using namespace medulla::tables;
 

@@ -17,9 +17,9 @@
 #include "bench_lobes.hpp"
 #include "plot_log.hpp"
 #include "sim2d/random.hpp"
-#include "sim2d/tracer_kernel.hpp"
-#include "statistics.hpp"
-#include "tables/request.hpp"
+#include "sim2d/tracer/kernel.hpp"
+#include "tables/job/request.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace medulla;
 using namespace medulla::sim2d;

@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "sim2d/analog.hpp"
 #include "sim2d/random.hpp"
-#include "sim2d/tracer.hpp"
-#include "sim2d/tracer_kernel.hpp"
-#include "tables/request.hpp"
+#include "sim2d/reference/analog.hpp"
+#include "sim2d/tracer/kernel.hpp"
+#include "sim2d/tracer/tracer.hpp"
+#include "tables/job/request.hpp"
 
 using namespace medulla;
 using namespace medulla::sim2d;

@@ -3,7 +3,7 @@
 
 #include "medulla/fur_parameters.hpp"
 #include "tables/error.hpp"
-#include "tables/material.hpp"
+#include "tables/job/material.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;

@@ -16,4 +16,13 @@ class Error : public std::runtime_error {
         : std::runtime_error(fmt::format(format, std::forward<Args>(args)...)) {}
 };
 
+/// Ended by a signal: exit status 128 + its number.
+class Interrupted : public Error {
+  public:
+    template <class... Args>
+    explicit Interrupted(int number, fmt::format_string<Args...> format, Args&&... args)
+        : Error(format, std::forward<Args>(args)...), signal(number) {}
+    const int signal;
+};
+
 }  // namespace medulla::tables

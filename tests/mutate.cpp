@@ -14,12 +14,12 @@
 #include <string>
 
 #include "medulla/medulla.hpp"
-#include "tables/compress.hpp"
 #include "tables/error.hpp"
-#include "tables/file.hpp"
-#include "tables/pack_writer.hpp"
-#include "tables/simulate.hpp"
-#include "tables/tables_file.hpp"
+#include "tables/job/simulate.hpp"
+#include "tables/pack/compress.hpp"
+#include "tables/pack/writer.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/tables_file.hpp"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define MEDULLA_WATCH 0

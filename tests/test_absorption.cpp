@@ -6,17 +6,17 @@
 #include <memory>
 #include <vector>
 
-#include "analytic_pack.hpp"
-#include "fur_reference.hpp"
 #include "medulla/far_field.hpp"
 #include "medulla/queries.hpp"
 #include "medulla/sampling.hpp"
-#include "sim2d/disc_deterministic.hpp"
-#include "sim2d/disc_single.hpp"
-#include "tables/compress.hpp"
-#include "tables/simulate.hpp"
-#include "tables/slices.hpp"
-#include "tables/source.hpp"
+#include "sim2d/disc/deterministic.hpp"
+#include "sim2d/disc/single.hpp"
+#include "tables/job/simulate.hpp"
+#include "tables/pack/compress.hpp"
+#include "tables/pack/source.hpp"
+#include "tables/store/slices.hpp"
+#include "tests/support/analytic_pack.hpp"
+#include "tests/support/fur_reference.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;

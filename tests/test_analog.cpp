@@ -5,7 +5,7 @@
 #include <set>
 #include <vector>
 
-#include "sim2d/analog.hpp"
+#include "sim2d/reference/analog.hpp"
 
 using namespace medulla;
 using namespace medulla::sim2d;

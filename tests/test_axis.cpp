@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "medulla/axis.hpp"
-#include "tables/axis.hpp"
 #include "tables/error.hpp"
-#include "tables/spline.hpp"
+#include "tables/pack/spline.hpp"
+#include "tables/table/axis.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;

@@ -5,9 +5,9 @@
 #include <random>
 #include <vector>
 
-#include "analytic_pack.hpp"
-#include "fur_reference.hpp"
 #include "medulla/medulla.hpp"
+#include "tests/support/analytic_pack.hpp"
+#include "tests/support/fur_reference.hpp"
 
 using namespace medulla;
 using analytic::AnalyticPack;

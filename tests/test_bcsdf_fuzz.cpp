@@ -7,8 +7,8 @@
 #include <memory>
 #include <random>
 
-#include "analytic_pack.hpp"
 #include "medulla/medulla.hpp"
+#include "tests/support/analytic_pack.hpp"
 
 using namespace medulla;
 

@@ -7,9 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "analytic_pack.hpp"
 #include "medulla/medulla.hpp"
-#include "statistics.hpp"
+#include "tests/support/analytic_pack.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace medulla;
 using analytic::AnalyticPack;

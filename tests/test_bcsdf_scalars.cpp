@@ -4,9 +4,9 @@
 #include <functional>
 #include <random>
 
-#include "analytic_pack.hpp"
-#include "fur_reference.hpp"
 #include "medulla/medulla.hpp"
+#include "tests/support/analytic_pack.hpp"
+#include "tests/support/fur_reference.hpp"
 
 // A dual number: a value and its derivative along one direction. The least a scalar of the runtime's needs.
 namespace dual {

@@ -9,8 +9,8 @@
 #include <random>
 #include <vector>
 
-#include "analytic_pack.hpp"
 #include "medulla/medulla.hpp"
+#include "tests/support/analytic_pack.hpp"
 
 using namespace medulla;
 

@@ -4,10 +4,10 @@
 
 #include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
-#include "tables/axis.hpp"
-#include "tables/compress.hpp"
 #include "tables/error.hpp"
-#include "tables/simulate.hpp"
+#include "tables/job/simulate.hpp"
+#include "tables/pack/compress.hpp"
+#include "tables/table/axis.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "sim2d/analog.hpp"
-#include "sim2d/disc_deterministic.hpp"
-#include "sim2d/disc_single.hpp"
+#include "sim2d/disc/deterministic.hpp"
+#include "sim2d/disc/single.hpp"
+#include "sim2d/reference/analog.hpp"
 
 using namespace medulla::sim2d;
 

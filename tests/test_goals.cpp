@@ -4,10 +4,10 @@
 #include <map>
 #include <mutex>
 
-#include "tables/budget.hpp"
 #include "tables/error.hpp"
-#include "tables/scene.hpp"
-#include "tables/schedule.hpp"
+#include "tables/job/budget.hpp"
+#include "tables/job/scene.hpp"
+#include "tables/job/schedule.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;

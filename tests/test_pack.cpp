@@ -4,7 +4,7 @@
 #include <random>
 
 #include "medulla/medulla.hpp"
-#include "tables/pack_writer.hpp"
+#include "tables/pack/writer.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;

@@ -4,7 +4,7 @@
 
 #include "medulla/phase.hpp"
 #include "sim2d/random.hpp"
-#include "statistics.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace medulla;
 

@@ -3,7 +3,7 @@
 #include <limits>
 #include <random>
 
-#include "sim2d/tracer_kernel.hpp"  // chooses the instruction set of all that Highway dispatches
+#include "sim2d/tracer/kernel.hpp"  // chooses the instruction set of all that Highway dispatches
 #include "tensor/product.hpp"
 
 using namespace medulla::tensor;

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "medulla/phase.hpp"
-#include "sim2d/slab_angles.hpp"
-#include "sim2d/slab_deterministic.hpp"
-#include "sim2d/slab_doubling.hpp"
-#include "sim2d/slab_single.hpp"
+#include "sim2d/reference/slab_doubling.hpp"
+#include "sim2d/slab/angles.hpp"
+#include "sim2d/slab/deterministic.hpp"
+#include "sim2d/slab/single.hpp"
 
 namespace {
 

@@ -7,10 +7,10 @@
 #include <fstream>
 
 #include "tables/error.hpp"
-#include "tables/file.hpp"
-#include "tables/simulate.hpp"
-#include "tables/source.hpp"
-#include "tables/tables_file.hpp"
+#include "tables/job/simulate.hpp"
+#include "tables/pack/source.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/tables_file.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;

@@ -8,15 +8,15 @@
 #include <string>
 #include <thread>
 
-#include "sim2d/analog.hpp"
-#include "sim2d/disc_deterministic.hpp"
-#include "sim2d/disc_single.hpp"
+#include "sim2d/disc/deterministic.hpp"
+#include "sim2d/disc/single.hpp"
 #include "sim2d/quadrature.hpp"
-#include "sim2d/slab_deterministic.hpp"
-#include "sim2d/slab_single.hpp"
-#include "sim2d/tracer.hpp"
-#include "sim2d/tracer_kernel.hpp"
-#include "statistics.hpp"
+#include "sim2d/reference/analog.hpp"
+#include "sim2d/slab/deterministic.hpp"
+#include "sim2d/slab/single.hpp"
+#include "sim2d/tracer/kernel.hpp"
+#include "sim2d/tracer/tracer.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace medulla;
 using namespace medulla::sim2d;
@@ -334,7 +334,7 @@ TEST_CASE("Walks with absorption: the deterministic solver's lobes, energies and
           "[tracer][absorption]") {
     // As above: E[true error^2 - standard error^2] = 0 over independent repetitions, at 5 of its own standard errors,
     // for lobes and energies. Means over the repetitions at 5 of their standard errors; energies of the reference keep
-    // 2e-4, its lengths 1e-3 and 3e-5 over the share of collided light that leaves (sim2d/disc_deterministic.hpp).
+    // 2e-4, its lengths 1e-3 and 3e-5 over the share of collided light that leaves (sim2d/disc/deterministic.hpp).
     const std::vector<double> absorption{0.0, 0.1, 1.0, 6.0}, h{0.0, 0.55, 0.97};
     for (const double g : {0.0, 0.6, 0.95}) {
         const DiscSolver solver(g);

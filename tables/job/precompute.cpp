@@ -1,0 +1,194 @@
+#include "tables/job/precompute.hpp"
+
+#include <omp.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <mutex>
+
+#include "tables/error.hpp"
+#include "tables/job/budget.hpp"
+#include "tables/parallel.hpp"
+
+namespace medulla::tables {
+namespace {
+
+std::atomic<bool> stop{false};
+std::atomic<int> caught{0};
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
+
+constexpr unsigned seconds_of_grace = 5;
+
+/// What a signal handler may do: say it and end. Slices are on disk or not, so nothing is left half done.
+[[noreturn]] void give_up() {
+    constexpr char text[] = "medulla-precompute: interrupted: slices in work given up; go on with --resume\n";
+    if (::write(STDERR_FILENO, text, sizeof text - 1) < 0) ::_exit(1);
+    ::_exit(128 + caught);
+}
+
+/// Catches SIGINT and SIGTERM while it lives: the first gives the slices in work a few seconds to end, the second none.
+class Interrupts {
+  public:
+    Interrupts() {
+        stop = false, caught = 0;
+        struct sigaction action = {};
+        action.sa_handler = [](int number) {
+            if (number == SIGALRM || caught.exchange(number) != 0) give_up();
+            stop = true;
+            ::alarm(seconds_of_grace);
+        };
+        action.sa_flags = SA_RESTART;
+        ::sigaction(SIGINT, &action, &old_[0]);
+        ::sigaction(SIGTERM, &action, &old_[1]);
+        ::sigaction(SIGALRM, &action, &old_[2]);
+    }
+    ~Interrupts() {
+        ::alarm(0);
+        ::sigaction(SIGALRM, &old_[2], nullptr);
+        ::sigaction(SIGINT, &old_[0], nullptr);
+        ::sigaction(SIGTERM, &old_[1], nullptr);
+    }
+    Interrupts(const Interrupts&) = delete;
+    Interrupts& operator=(const Interrupts&) = delete;
+
+  private:
+    struct sigaction old_[3];
+};
+
+/// Whether the output holds this job already. Throws Error where it is of another one.
+std::optional<Tables> finished(const Job& job, const Tables& plan) {
+    if (!std::filesystem::exists(job.output)) return std::nullopt;
+    Tables tables = read_tables(job.output);
+    const Digest expected = configuration_hash(plan), found = configuration_hash(tables);
+    if (expected != found)
+        throw Error("{}: expected configuration {}, found {}: it belongs to another job", job.output, hex(expected),
+                    hex(found));
+    return tables;
+}
+
+/// A kept slice; what it took is not known, what it should have taken is.
+Refinable refinable(const Request& request, const ShardFolder& folder, const SliceId& id) {
+    std::string why;
+    const std::optional<Slice> slice = folder.read(id, why);
+    if (!slice) throw Error("{}: damaged: {}", folder.file_of(id), why);
+    return {id, slice->standard_error, static_cast<double>(expected_cost(request, id)) * 1e-6};
+}
+
+/// Solves what `slices` misses and keeps it; with a time budget coarsely first, then where error falls most.
+void solve(const Job& job, const SliceSolver& solver, const ShardFolder& folder, const std::vector<SliceId>& slices,
+           const std::vector<bool>& kept) {
+    const double start = omp_get_wtime(), budget = job.request.time_budget;
+    std::vector<SliceId> missing;
+    std::vector<Refinable> coarse;
+    std::size_t cells = 0, done = 0;
+    for (std::size_t i = 0; i < slices.size(); ++i) {
+        const std::size_t count = slice_cells(table_of(solver.plan(), slices[i].table));
+        cells += count;
+        if (!kept[i]) {
+            missing.push_back(slices[i]);
+            continue;
+        }
+        done += count;
+        if (budget > 0) coarse.push_back(refinable(job.request, folder, slices[i]));
+    }
+    {
+        Progress progress(job.progress, "precompute", cells, done);
+        std::mutex mutex;
+        in_parallel(missing.size(), job.request.threads, stop, [&](std::size_t i) {
+            const double began = omp_get_wtime();
+            const Slice slice = budget > 0 ? solver.solve(missing[i], refinements[0]) : solver.solve(missing[i]);
+            folder.write(missing[i], slice);
+            progress.add(slice.cells);
+            if (budget == 0) return;
+            const std::lock_guard<std::mutex> lock(mutex);
+            coarse.push_back({missing[i], slice.standard_error, omp_get_wtime() - began});
+        });
+    }
+    if (budget == 0 || stop) return;
+    refine(solver, std::move(coarse), budget - (omp_get_wtime() - start), job.request.threads, stop,
+           [&](const SliceId& id, const Slice& slice) { folder.write(id, slice); });
+}
+
+std::size_t count_kept(const ShardFolder& folder, const std::vector<SliceId>& slices) {
+    std::size_t count = 0;
+    for (const SliceId& id : slices) count += std::filesystem::exists(folder.file_of(id));
+    return count;
+}
+
+void interrupted_if_asked(const ShardFolder& folder, const std::vector<SliceId>& slices) {
+    if (stop)
+        throw Interrupted(caught, "interrupted: {} of {} slices kept in {}; go on with --resume",
+                          count_kept(folder, slices), slices.size(), folder.path());
+}
+
+}  // namespace
+
+Tables assemble(const ShardFolder& folder, const Tables& plan) {
+    Tables tables = plan;
+    for (auto* table : {&tables.azimuthal, &tables.longitudinal})
+        if (*table) (*table)->allocate();
+    for (const SliceId& id : slices_of(plan)) {
+        std::string why;
+        const std::optional<Slice> slice = folder.read(id, why);
+        if (!slice) throw Error("{}: damaged: {}", folder.file_of(id), why);
+        put_slice(tables, id, *slice);
+    }
+    return tables;
+}
+
+JobReport run_job(const Job& job) {
+    const Interrupts interrupts;
+    if (std::filesystem::is_directory(job.output))
+        throw Error("{}: expected the name of a file, found a folder", job.output);
+    const SliceSolver solver(job.request);
+    const Tables& plan = solver.plan();
+    ShardFolder folder(ShardFolder::beside(job.output), plan);
+    JobReport report;
+    report.shards = folder.path();
+    const std::vector<SliceId> all = slices_of(plan);
+    const std::vector<SliceId> slices = job.shard ? share_of(job.request, all, *job.shard) : by_cost(job.request, all);
+    report.slices = slices.size();
+    if (job.resume)
+        if (auto tables = finished(job, plan)) {
+            report.tables = std::move(*tables);
+            report.was_complete = true;
+            report.kept = slices.size();
+            if (!job.shard && std::filesystem::exists(folder.path())) {  // killed between the last two steps
+                folder.open(true);
+                folder.remove();
+            }
+            return report;
+        }
+    if (!job.resume && !job.shard && !folder.files().empty())
+        throw Error("{}: holds slices of an earlier run; go on with --resume, or delete it", folder.path());
+    folder.open(!job.shard);
+    try {
+        const std::vector<bool> kept = folder.kept(slices);
+        report.kept = static_cast<std::size_t>(std::count(kept.begin(), kept.end(), true));
+        if (job.shard && !job.resume && report.kept > 0)
+            throw Error("{}: holds {} of this worker's {} slices already; go on with --resume, or delete it",
+                        folder.path(), report.kept, slices.size());
+        solve(job, solver, folder, slices, kept);
+        interrupted_if_asked(folder, slices);
+        if (job.shard) {
+            report.tables = plan;
+            return report;
+        }
+        report.tables = assemble(folder, plan);
+        interrupted_if_asked(folder, slices);
+        write_tables(job.output, report.tables, job.compression, folder.scratch());
+    } catch (const Interrupted&) {
+        throw;
+    } catch (const Error& error) {
+        const std::size_t count = count_kept(folder, slices);
+        folder.remove_if_empty();
+        if (count == 0 || job.shard) throw;
+        throw Error("{}; {} of {} slices kept in {}, go on with --resume", error.what(), count, slices.size(),
+                    folder.path());
+    }
+    folder.remove();
+    return report;
+}
+
+}  // namespace medulla::tables

@@ -1,0 +1,342 @@
+// furtable info and furtable verify: what a file holds, and whether it keeps what it promises.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "medulla/lookup.hpp"
+#include "tables/programs/commands.hpp"
+#include "tables/store/json_text.hpp"
+#include "tables/store/slices.hpp"
+#include "tables/store/tables_file.hpp"
+
+namespace medulla::tables {
+namespace {
+
+struct InfoWords {
+    std::vector<std::string> files;
+    bool json = false;
+};
+
+bool is_tables(const std::string& path) { return path != "default" && is_hdf5(path); }
+
+double median(std::vector<double> values) {
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+    return values[values.size() / 2];
+}
+
+nlohmann::ordered_json axis_json(const Axis& axis) {
+    return {{"name", axis.name}, {"unit", axis_rule(axis.name).unit}, {"nodes", axis.size()}, {"values", axis.values}};
+}
+
+nlohmann::ordered_json info(const std::string& path) {
+    nlohmann::ordered_json json = {{"file", path}};
+    if (is_tables(path)) {
+        const Tables tables = read_tables(path);
+        json["kind"] = "tables";
+        json["program"] = tables.program;
+        json["sha256"] = hex(contents_hash(tables));
+        json["configuration"] = hex(configuration_hash(tables));
+        for (const Table* table : tables.present()) {
+            nlohmann::ordered_json& out = json["tables"][table->name];
+            out["method"] = table->method;
+            out["seed"] = table->seed;
+            out["paths"] = table->paths;
+            if (table->target_error > 0) out["target_error"] = table->target_error;
+            if (table->time_budget > 0) out["time_budget"] = table->time_budget;
+            for (const Axis& axis : table->axes) out["axes"].push_back(axis_json(axis));
+            out["standard_error"] = {
+                {"median", median(table->standard_error)},
+                {"worst", *std::max_element(table->standard_error.begin(), table->standard_error.end())}};
+        }
+        return json;
+    }
+    const std::vector<unsigned char> bytes = read_pack(path, true);
+    const PackView pack = open_pack(bytes.data(), bytes.size()).pack;
+    const auto source = pack_source(bytes, path);
+    json["kind"] = "pack";
+    json["format_version"] = pack_version;
+    json["bytes"] = bytes.size();
+    for (const TableView& table : pack.tables) {
+        if (!table) continue;
+        const auto kind = static_cast<TableKind>(table.layout.kind);
+        nlohmann::ordered_json& out = json["tables"][name_of(kind)];
+        out["rank"] = table.layout.even_rank + table.layout.odd_rank;
+        out["even_rank"] = table.layout.even_rank;
+        for (const Axis& axis : source->parameter_axes(kind)) out["axes"].push_back(axis_json(axis));
+        if (table.has_exit())
+            out["exit"] = {{"name", exit_name(kind)},
+                           {"bins", source->bins(kind)},
+                           {"spans", table.layout.axes[table.parameter_axes()].spans}};
+    }
+    json["provenance"] =
+        parse_json<nlohmann::ordered_json>(pack.text, pack.text + pack.text_bytes, path + ": provenance");
+    return json;
+}
+
+void print_axes(const nlohmann::ordered_json& axes) {
+    for (const auto& axis : axes) {
+        const std::vector<double> values = axis["values"];
+        fmt::print("    {:<10} {:>11}, {:.6g} .. {:.6g} [{}]\n", axis["name"].get<std::string>(),
+                   counted(values.size(), "node"), values.front(), values.back(), axis["unit"].get<std::string>());
+    }
+}
+
+/// `auto` solves without paths where its grids reach what so many paths would.
+std::string how_solved(const nlohmann::ordered_json& table) {
+    const auto method = table["method"].get<std::string>();
+    const auto paths = table["paths"].get<std::uint64_t>();
+    std::string text = fmt::format("method {}", method);
+    if (method == "auto" && paths > 0)
+        return text + fmt::format(": without paths, or with {} (seed {}) where these give a smaller error", paths,
+                                  table["seed"].get<std::uint64_t>());
+    if (method != "deterministic") text += fmt::format(", seed {}", table["seed"].get<std::uint64_t>());
+    if (paths > 0) text += fmt::format(", paths {}", paths);
+    return text;
+}
+
+void run_info(const InfoWords& words) {
+    for (const std::string& file : words.files) {
+        const nlohmann::ordered_json json = info(file);
+        if (words.json) {
+            fmt::print("{}\n", json.dump());
+            continue;
+        }
+        const bool tables = json["kind"] == "tables";
+        fmt::print("{}: {}\n", file,
+                   tables
+                       ? fmt::format("tables, written by {}", json["program"].get<std::string>())
+                       : fmt::format("pack of version {}, {} bytes", pack_version, json["bytes"].get<std::size_t>()));
+        for (const auto& [name, table] : json["tables"].items()) {
+            if (tables)
+                fmt::print("  {}: {}\n    standard error of a lobe: median {:.2e}, worst {:.2e}\n", name,
+                           how_solved(table), table["standard_error"]["median"].get<double>(),
+                           table["standard_error"]["worst"].get<double>());
+            else
+                fmt::print("  {}: rank {}\n", name, table["rank"].get<int>());
+            for (const char* goal : {"target_error", "time_budget"})
+                if (table.contains(goal)) fmt::print("    {} {:g}\n", goal, table[goal].get<double>());
+            print_axes(table["axes"]);
+            if (table.contains("exit"))
+                fmt::print("    {:<10} {:>5} bins as {} spline spans\n", table["exit"]["name"].get<std::string>(),
+                           table["exit"]["bins"].get<std::size_t>(), table["exit"]["spans"].get<int>());
+        }
+        if (tables) fmt::print("  SHA-256 of the contents: {}\n", json["sha256"].get<std::string>());
+        if (!tables) fmt::print("  provenance: {}\n", json["provenance"].dump());
+    }
+}
+
+// --- verify ------------------------------------------------------------------------------------------------------
+
+struct VerifyWords {
+    std::vector<std::string> files;
+    double most_dip = 0.5;
+    bool json = false;
+};
+
+/// Relative L2 distance of a lobe from its mirror image.
+double asymmetry(const std::vector<double>& lobe) {
+    double difference = 0, norm = 0;
+    for (std::size_t b = 0; b < lobe.size(); ++b) {
+        const double d = lobe[b] - lobe[lobe.size() - 1 - b];
+        difference += d * d, norm += lobe[b] * lobe[b];
+    }
+    return std::sqrt(difference / norm);
+}
+
+/// What a table promises beyond what reading it checks: mirror-symmetric lobes where the light is head-on.
+void verify_table(const Table& table, const std::string& path) {
+    const char* offset = table.name == "longitudinal" ? "theta_i" : "h";
+    for (std::size_t cell = 0; cell < table.cells(); ++cell) {
+        if (table.parameter(cell, offset) != 0) continue;
+        const double noise = table.standard_error[cell];
+        const double found = asymmetry({table.lobe_of(cell), table.lobe_of(cell) + table.bins()});
+        if (found > 5 * std::sqrt(2.0) * noise + 1e-6)
+            throw Error(
+                "{}: /{}: {}: expected a mirror-symmetric lobe, found asymmetry {:.2e} at standard error {:.2e}", path,
+                table.name, table.describe(cell), found, noise);
+    }
+}
+
+/// Greatest excess over [0, 1] of the share of the slab's light that leaves backward; NaN if one is.
+double share_excess(const Source& pack) {
+    if (!pack.has(TableKind::back_fraction)) return 0;
+    const std::vector<Axis> axes = pack.parameter_axes(TableKind::back_fraction);
+    double worst = 0;
+    Parameters at;
+    for (const double sigma : axes[0].values)
+        for (const double g : axes[1].values)
+            for (const double theta_i : axes[2].values) {
+                at.sigma = sigma, at.g = g, at.theta_i = theta_i;
+                const double share = pack.back_fraction(at), excess = std::max(-share, share - 1);
+                worst = std::isnan(excess) ? excess : std::max(worst, excess);
+            }
+    return worst;
+}
+
+/// Absorption leaves all at 0 and less and less beyond it, at every node.
+void verify_survival(const Source& pack, const std::string& path) {
+    const std::vector<Axis> axes = pack.parameter_axes(TableKind::azimuthal);  // sigma, g, absorption, h
+    for (const double sigma : axes[0].values)
+        for (const double g : axes[1].values)
+            for (const double h : axes[3].values) {
+                double before = 1;
+                for (const double a : axes[2].values) {
+                    Parameters at;
+                    at.sigma = sigma, at.g = g, at.absorption = a, at.h = h;
+                    const double left = pack.survival(at);
+                    if (!(left > 0 && (a == 0 ? left == 1 : left < before)))
+                        throw Error(
+                            "{}: sigma {:g}, g {:g}, absorption {:g}, h {:g}: expected less to be left than {:g}, "
+                            "found {:g}",
+                            path, sigma, g, a, h, before, left);
+                    before = left;
+                }
+            }
+}
+
+/// What the dips below 0 of signed lobes would add to their integral 1, the most at any node: at most a lobe's L1
+/// error, so coarse packs, which a bound of --max-error may ask for, dip deep and are yet what they should be.
+double greatest_dip(const PackView& pack, const Source& source) {
+    double greatest = 0;
+    for (const TableKind kind : lobe_kinds) {
+        if (!source.has(kind)) continue;
+        const std::vector<Axis> axes = source.parameter_axes(kind);
+        std::size_t nodes = 1;
+        for (const Axis& axis : axes) nodes *= axis.size();
+        for (std::size_t node = 0; node < nodes; ++node) {
+            Parameters at;
+            std::size_t rest = node;
+            for (const Axis& axis : axes) at.set(axis.name, axis.values[rest % axis.size()]), rest /= axis.size();
+            LobeQuery query;
+            query.sigma = static_cast<float>(at.sigma), query.g = static_cast<float>(at.g);
+            query.h = static_cast<float>(at.h), query.theta_i = static_cast<float>(at.theta_i);
+            query.absorption = static_cast<float>(at.absorption);
+            const double whole = held_integral(pack[kind], contract_signed(pack[kind], query));
+            greatest = std::max(greatest, whole - 1);
+        }
+    }
+    return greatest;
+}
+
+/// What is known of a good file: cells of tables; greatest errors and degeneracy of a pack.
+struct Verified {
+    std::optional<std::size_t> cells;
+    std::optional<double> energy_error, dip;
+    PackDegeneracy degeneracy;
+};
+
+/// Every node of a pack: finite, >= 0, integral 1; shares of energy in [0, 1]. What dips hold is at most `most_dip`: at
+/// half of a lobe its factors are no density at all.
+void verify_pack(const PackView& pack, const Source& source, const std::string& path, double most_dip,
+                 Verified& found) {
+    const double excess = share_excess(source);
+    if (!(excess <= 0.5))
+        throw Error("{}: {}: expected shares within 0.5 of [0, 1], found one off by {:.2e}", path,
+                    name_of(TableKind::back_fraction), excess);
+    found.energy_error = 0;
+    for (const LobeError& error : compare(source, source)) {
+        if (!(error.energy <= 1e-3) || !(error.least >= 0))  // bins at dips' ends are integrated to 1e-5 or so
+            throw Error("{}: {} lobes: expected densities >= 0 of integral 1, found {:g} (integral off by {:g})", path,
+                        name_of(error.kind), error.least, error.energy);
+        found.energy_error = std::max(*found.energy_error, error.energy);
+    }
+    if (source.absorbs()) verify_survival(source, path);
+    found.dip = greatest_dip(pack, source);
+    if (!(*found.dip <= most_dip))
+        throw Error("{}: expected lobes whose dips below 0 hold at most {:g} of their integral 1, found {:.2e}", path,
+                    most_dip, *found.dip);
+}
+
+/// Throws Error that says what is wrong with it.
+Verified verify(const std::string& file, double most_dip) {
+    Verified found;
+    if (is_tables(file)) {
+        const Tables tables = read_tables(file);
+        found.cells = 0;
+        for (const Table* table : tables.present()) {
+            verify_table(*table, file);
+            *found.cells += table->cells();
+        }
+    } else {
+        const std::vector<unsigned char> bytes = read_pack(file, true);
+        const PackView pack = open_pack(bytes.data(), bytes.size()).pack;
+        verify_pack(pack, *pack_source(bytes, file), file, most_dip, found);
+        found.degeneracy = degeneracy_of(pack);
+    }
+    return found;
+}
+
+template <class T>
+nlohmann::ordered_json or_null(const std::optional<T>& value) {
+    return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
+}
+
+void run_verify(const VerifyWords& words) {
+    nlohmann::ordered_json json;
+    bool all_good = true;
+    for (const std::string& file : words.files) {
+        Verified found;
+        std::optional<std::string> error;
+        try {
+            found = verify(file, words.most_dip);
+        } catch (const Error& wrong) {
+            error = wrong.what();
+            all_good = false;
+            say("furtable", *error);
+        }
+        const nlohmann::ordered_json degeneracy = to_json(found.degeneracy);
+        json[file] = {{"ok", !error},
+                      {"error", or_null(error)},
+                      {"cells", or_null(found.cells)},
+                      {"energy_error", or_null(found.energy_error)},
+                      {"dip", or_null(found.dip)},
+                      {"degeneracy", degeneracy}};
+        if (words.json || error) continue;
+        if (found.cells)
+            fmt::print("{}: ok: SHA-256, {} finite and >= 0, integrals, energies and symmetry as they must be\n", file,
+                       counted(*found.cells, "cell"));
+        else
+            fmt::print(
+                "{}: ok: checksum, structure, lobes >= 0 of integral 1 within {:.1e}; dips hold at most {:.1e} of "
+                "{:g}\n",
+                file, *found.energy_error, *found.dip, words.most_dip);
+        print(found.degeneracy);
+    }
+    if (words.json) fmt::print("{}\n", json.dump());
+    if (!all_good) throw Reported();
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, Action& action) {
+    add_command<InfoWords>(
+        app, action, "info", "axes, sizes, errors, provenance",
+        [](CLI::App& command, InfoWords& words) {
+            command.add_option("FILE", words.files, "tables file, pack, or 'default': the pack built in")
+                ->required()
+                ->expected(1);
+            command.add_flag("--json", words.json, "print one JSON object");
+        },
+        run_info);
+}
+
+void add_verify(CLI::App& app, Action& action) {
+    add_command<VerifyWords>(
+        app, action, "verify", "structure, checksums, energies, symmetry, finite, non-negative",
+        [](CLI::App& command, VerifyWords& words) {
+            command.add_option("FILE", words.files, "tables files and packs; all are checked, also after a bad one")
+                ->required();
+            command
+                .add_option(
+                    "--max-dip", words.most_dip,
+                    "how much of a pack's signed lobe may lie below 0, where it is held at 0. The default tells "
+                    "densities from nonsense; `diff` says how accurate a pack is")
+                ->check(CLI::NonNegativeNumber)
+                ->capture_default_str();
+            command.add_flag("--json", words.json, "print one JSON object: an entry with the same keys for every file");
+        },
+        run_verify);
+}
+
+}  // namespace medulla::tables

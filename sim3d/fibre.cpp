@@ -20,7 +20,7 @@ bool within(double x, double low, double high) { return x >= low && x <= high; }
 
 }  // namespace
 
-void check(const Fibre& f, const Light& light, const FibreOptions& o) {
+void validate(const Fibre& f, const Light& light, const FibreOptions& o) {
     require(f.eta_c > 1 && f.eta_c <= 10, "eta_c", "a value in (1, 10]", f.eta_c);
     if (f.eta_m) require(within(*f.eta_m, 1, 10), "eta_m", "a value in [1, 10]", *f.eta_m);
     require(within(f.kappa, 0, 1), "kappa", "a value in [0, 1]", f.kappa);

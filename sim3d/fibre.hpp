@@ -48,7 +48,8 @@ struct Fibre {
     Tilt tilt = Tilt::theta_r;
 };
 
-/// Parallel light from omega_i = (sin theta_i, cos theta_i cos azimuth, cos theta_i sin azimuth), the fibre along x.
+/// Parallel light from omega_i = (sin theta_i, cos theta_i cos azimuth, cos theta_i sin azimuth), the fibre along x
+/// from tip to root, as the papers' theta is counted.
 struct Light {
     double theta_i = 0;             ///< inclination of the direction towards the light [radians], in (-pi/2, pi/2)
     double h_low = -1, h_high = 1;  ///< offsets that are lit, in [-1, 1]: equal for one ray, -1 and 1 for the far
@@ -67,6 +68,6 @@ struct FibreOptions {
 };
 
 /// @throws std::invalid_argument that names the field, what was expected and what was found
-void check(const Fibre& fibre, const Light& light, const FibreOptions& options);
+void validate(const Fibre& fibre, const Light& light, const FibreOptions& options);
 
 }  // namespace medulla::sim3d

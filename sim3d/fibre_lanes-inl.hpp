@@ -270,7 +270,7 @@ std::size_t Fly(LaneFibre& st, std::uint32_t order, std::size_t count) {
         const VF flight =
             hn::Min(hn::Div(hn::Neg(hn::Log(f, event)), Constant(std::max(st.sigma_ms, 1e-30f))), in_medulla);
         const VF t = hn::Add(t1, flight), cy = hn::MulAdd(t, dy, y), cz = hn::MulAdd(t, d.z, z);
-        const VF near = hn::Mul(q, hn::Mul(hn::Max(hn::Sub(rim, t), zero), hn::Add(behind, t)));
+        const VF product = hn::Mul(q, hn::Mul(hn::Max(hn::Sub(rim, t), zero), hn::Add(behind, t)));
         const VF fresh = hn::NegMulAdd(cy, cy, hn::NegMulAdd(cz, cz, one));
         const V3 turned = st.planar ? ScatterPlanar(st, d, words) : ScatterHg3d(st, d, words);
         const V3 on = Refreshed(Chosen(collides, turned, Chosen(met.split, met.in, settled)));
@@ -288,7 +288,7 @@ std::size_t Fly(LaneFibre& st, std::uint32_t order, std::size_t count) {
         const Squeeze squeeze(alive);
         squeeze.Store(hn::IfThenElse(collides, cy, ry), &r.y[out]),
             squeeze.Store(hn::IfThenElse(collides, cz, rz), &r.z[out]);
-        squeeze.Store(hn::IfThenElseZero(collides, hn::IfThenElse(hn::Gt(near, Constant(0.1f)), fresh, near)),
+        squeeze.Store(hn::IfThenElseZero(collides, hn::IfThenElse(hn::Gt(product, Constant(0.1f)), fresh, product)),
                       &r.s[out]);
         squeeze.Store(on.x, &r.dx[out]), squeeze.Store(on.y, &r.dy[out]), squeeze.Store(on.z, &r.dz[out]);
         squeeze.Store(weight, &r.weight[out]);

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "sim2d/tracer_state.hpp"  // kLaneMargin
+#include "sim2d/tracer/state.hpp"  // kLaneMargin
 #include "sim3d/cuticle_surface.hpp"
 #include "sim3d/fibre_profile.hpp"
 

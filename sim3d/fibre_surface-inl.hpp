@@ -8,7 +8,7 @@
 
 #include <cmath>
 
-#include "sim2d/tracer_math-inl.hpp"
+#include "sim2d/tracer/math-inl.hpp"
 #include "sim3d/fibre_lanes.hpp"
 
 HWY_BEFORE_NAMESPACE();

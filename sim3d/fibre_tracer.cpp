@@ -64,7 +64,7 @@ Side settle(const LaneFibre& fibre, LaneMeeting& meeting, std::uint32_t order) {
 }
 
 FibreProfile trace_fibre(const Fibre& fibre, const Light& light, const FibreOptions& options) {
-    check(fibre, light, options);
+    validate(fibre, light, options);
     if (fibre.eta_m && *fibre.eta_m != fibre.eta_c)
         throw std::invalid_argument("eta_m: expected eta_c (the reference implementation has two indices)");
     const std::uint64_t each = (options.paths + options.batches - 1) / options.batches;
@@ -77,10 +77,8 @@ FibreProfile trace_fibre(const Fibre& fibre, const Light& light, const FibreOpti
         LaneFibre mine = lanes;
         mine.sums = &batches[b], mine.batch = static_cast<std::uint32_t>(b);
         mine.paths = batches[b].paths = each, mine.stratum = static_cast<float>(1 / static_cast<double>(each));
-        for (mine.first = 0; mine.first < each; mine.first += kBatch)
-            HWY_DYNAMIC_DISPATCH(TraceLanes)
-            (mine, static_cast<std::size_t>(std::min<std::uint64_t>(kBatch, each - mine.first)),
-             FibreWalker::most_flights);
+        for (mine.first = 0; mine.first < each; mine.first += kBatch) HWY_DYNAMIC_DISPATCH(TraceLanes)
+        (mine, static_cast<std::size_t>(std::min<std::uint64_t>(kBatch, each - mine.first)), FibreWalker::most_flights);
     }
     return {fibre, options, std::move(batches)};
 }

@@ -135,7 +135,7 @@ PathExit FibreWalker::follow(double h, RandomStream& random) const {
 }
 
 FibreProfile walk_fibre(const Fibre& fibre, const Light& light, const FibreOptions& options) {
-    check(fibre, light, options);
+    validate(fibre, light, options);
     const FibreWalker walker(fibre, light);
     const std::uint64_t each = (options.paths + options.batches - 1) / options.batches;
     std::vector<FibreSums> batches(options.batches, FibreSums(fibre, options));

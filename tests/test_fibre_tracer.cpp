@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "medulla/cross_section.hpp"
-#include "sim2d/tracer_kernel.hpp"
+#include "sim2d/tracer/kernel.hpp"
 #include "sim3d/fibre_tracer.hpp"
 #include "sim3d/fibre_walk.hpp"
-#include "statistics.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace medulla;
 using namespace medulla::sim3d;

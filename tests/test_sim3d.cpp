@@ -12,10 +12,10 @@
 
 #include "medulla/cross_section.hpp"
 #include "medulla/fur_parameters.hpp"
-#include "sim2d/disc_deterministic.hpp"
+#include "sim2d/disc/deterministic.hpp"
 #include "sim2d/quadrature.hpp"
 #include "sim3d/fibre_walk.hpp"
-#include "statistics.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace medulla;
 using namespace medulla::sim3d;
@@ -383,7 +383,7 @@ TEST_CASE("Fibre: the same bytes for any number of threads", "[sim3d]") {
 TEST_CASE("Fibre: a bad parameter is named", "[sim3d]") {
     const auto message = [](const Fibre& f, const Light& light, const FibreOptions& o) -> std::string {
         try {
-            check(f, light, o);
+            validate(f, light, o);
         } catch (const std::invalid_argument& e) {
             return e.what();
         }

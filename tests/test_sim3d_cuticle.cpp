@@ -7,7 +7,7 @@
 #include "medulla/config.hpp"
 #include "sim3d/cuticle_surface.hpp"
 #include "sim3d/fibre_walk.hpp"
-#include "statistics.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace medulla;
 using namespace medulla::sim3d;

@@ -36,7 +36,6 @@ Error relative(const DirectionalDensity& a, const DirectionalDensity& b) {
     }
     return {std::sqrt(d / n), std::sqrt(e / n)};
 }
-double relative_noise(const DirectionalDensity& a) { return relative(a, a).own; }
 
 }  // namespace
 
@@ -87,7 +86,7 @@ int main(int argc, char** argv) {
                     const FibreProfile p = fast ? trace_fibre(fibre, light, o) : walk_fibre(fibre, light, o);
                     const double seconds = now() - start;
                     const DirectionalDensity d = p.density(scattered);
-                    const double noise = relative_noise(d);
+                    const double noise = d.relative_error();
                     const Error error = truth > 0 ? relative(d, reference) : Error{};
                     // The reference's own noise is part of the distance.
                     const double true_error =

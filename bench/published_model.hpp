@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "medulla/config.hpp"
@@ -26,20 +28,23 @@ inline sim3d::Fibre fibre_of(const FurPreset& p) {
     return f;
 }
 
+/// What M^s is made of.
 enum class Longitudinal {
-    published,   ///< M^s from the slab's C^M
-    with_cosine  ///< C^M times cos theta_r, each side over its integral: exits of a cylinder per solid angle
+    house,         ///< C^M at sigma_ms kappa / cos theta_t: docs/bcsdf.md
+    authors,       ///< C^M at sigma_ms kappa: the authors' plug-in
+    house_cosine,  ///< either times cos theta_r, each side over its integral: a cylinder's exits per solid angle
+    authors_cosine,
 };
+inline constexpr int longitudinal_count = 4;
 
 struct PublishedModel {
-    double energy[5] = {};                ///< R, TT, TRT, TTs, TRTs
-    sim3d::DirectionalDensity scattered;  ///< of TTs and TRTs, published
-    sim3d::DirectionalDensity with_cosine;
+    double energy[5] = {};                                    ///< R, TT, TRT, TTs, TRTs
+    sim3d::DirectionalDensity scattered[longitudinal_count];  ///< of TTs and TRTs
 };
 
-/// Mean of the lobes over all offsets, averaged over bins. One channel.
-inline PublishedModel published_model(const sim3d::Fibre& f, double theta_i, std::size_t theta_bins,
-                                      std::size_t phi_bins) {
+/// The lobes of one offset, or without one their mean over all offsets; averaged over bins. One channel.
+inline PublishedModel published_model(const sim3d::Fibre& f, double theta_i, std::optional<double> only_h,
+                                      std::size_t theta_bins, std::size_t phi_bins) {
     const double eta = f.eta_c, kappa = f.kappa, ci = std::cos(theta_i);
     const double prime = std::sqrt(eta * eta - std::pow(std::sin(theta_i), 2)) / ci;
     const double cos_t = std::sqrt(1 - std::pow(std::sin(theta_i) / eta, 2)), ca = f.sigma_ca[0];
@@ -61,24 +66,29 @@ inline PublishedModel published_model(const sim3d::Fibre& f, double theta_i, std
         A[3] = (1 - F) * std::exp(-s_c * ca / cos_t) * T_b * -std::expm1(-2 * s_m * f.sigma_ms / cos_t);
         A[4] = A[3] * F * left;
     };
-    // h = sin t takes the roots at the rim away; the medulla's edge splits the range.
-    const double edge = kappa * prime < 1 ? std::asin(kappa * prime) : pi / 2;
     std::vector<double> h, weight;
-    for (const auto& [low, high] : {std::pair{0.0, edge}, std::pair{edge, pi / 2}})
-        for (std::size_t i = 0; i < rule.nodes.size() && high > low; ++i) {
-            const double u = rule.nodes[i], t = low + (high - low) * (high < pi / 2 ? 1 - (1 - u) * (1 - u) : u);
-            const double slope = high < pi / 2 ? 2 * (1 - u) : 1;
-            h.push_back(std::sin(t)), weight.push_back(std::cos(t) * (high - low) * slope * rule.weights[i]);
-        }
-    m.scattered.theta_bins = theta_bins, m.scattered.phi_bins = phi_bins;
-    m.scattered.value.assign(theta_bins * phi_bins, 0), m.with_cosine = m.scattered;
-    // N^s over phi = 0 (back) ..., folded: both signs of h.
+    if (only_h) {
+        h = {*only_h}, weight = {1};
+    } else {
+        // h = sin t takes the roots at the rim away; the medulla's edge splits the range.
+        const double edge = kappa * prime < 1 ? std::asin(kappa * prime) : pi / 2;
+        for (const auto& [low, high] : {std::pair{0.0, edge}, std::pair{edge, pi / 2}})
+            for (std::size_t i = 0; i < rule.nodes.size() && high > low; ++i) {
+                const double u = rule.nodes[i], t = low + (high - low) * (high < pi / 2 ? 1 - (1 - u) * (1 - u) : u);
+                const double slope = high < pi / 2 ? 2 * (1 - u) : 1;
+                h.push_back(std::sin(t)), weight.push_back(std::cos(t) * (high - low) * slope * rule.weights[i]);
+            }
+    }
+    for (sim3d::DirectionalDensity& d : m.scattered) {
+        d.theta_bins = theta_bins, d.phi_bins = phi_bins;
+        d.value.assign(theta_bins * phi_bins, 0.0);
+    }
     const std::size_t fine = 1440;
     std::vector<double> N(fine, 0.0);
     const double sigma = f.sigma_ms * kappa / cos_t;
     std::vector<double> offsets;
     for (const double x : h)
-        if (x < kappa * prime) offsets.push_back(x / prime / kappa);
+        if (std::abs(x) < kappa * prime) offsets.push_back(x / prime / kappa);
     std::vector<sim2d::Profile> lobes;
     if (sigma > 0 && !offsets.empty()) lobes = sim2d::DiscSolver(f.g).solve(sigma, offsets, fine);
     for (std::size_t i = 0; i < h.size(); ++i) {
@@ -102,29 +112,35 @@ inline PublishedModel published_model(const sim3d::Fibre& f, double theta_i, std
         }
     }
     if (lobes.empty()) return m;
-    for (std::size_t b = 0; b < fine / 2; ++b) N[b] = N[fine - 1 - b] = 0.5 * (N[b] + N[fine - 1 - b]);
+    if (!only_h)  // the other sign of h
+        for (std::size_t b = 0; b < fine / 2; ++b) N[b] = N[fine - 1 - b] = 0.5 * (N[b] + N[fine - 1 - b]);
     const std::size_t per_bin = 8;
-    const auto slab = sim2d::SlabSolver(f.g).solve(sigma, {theta_i}, theta_bins * per_bin)[0];
-    std::vector<double> M[2][2];  // [longitudinal][side]
-    for (const int side : {0, 1}) {
-        const std::vector<double>& lobe = (side == 0 ? slab.back : slab.forward).lobe;
-        M[0][side].assign(theta_bins, 0), M[1][side].assign(theta_bins, 0);
-        double sum[2] = {};
-        for (std::size_t i = 0; i < lobe.size(); ++i) {
-            const double c = std::cos(((double(i) + 0.5) / double(lobe.size()) - 0.5) * pi);
-            M[0][side][i / per_bin] += lobe[i], M[1][side][i / per_bin] += lobe[i] * c;
-            sum[0] += lobe[i], sum[1] += lobe[i] * c;
+    std::vector<double> M[longitudinal_count][2];  // by side: back, forward
+    const sim2d::SlabSolver slab_solver(f.g);
+    for (const int authors : {0, 1}) {
+        const double depth = authors ? f.sigma_ms * kappa : sigma;
+        const auto slab = slab_solver.solve(depth, {theta_i}, theta_bins * per_bin)[0];
+        for (const int side : {0, 1}) {
+            const std::vector<double>& lobe = (side == 0 ? slab.back : slab.forward).lobe;
+            std::vector<double> plain(theta_bins, 0.0), cosine(theta_bins, 0.0);
+            double sum = 0, cosine_sum = 0;
+            for (std::size_t i = 0; i < lobe.size(); ++i) {
+                const double c = std::cos(((double(i) + 0.5) / double(lobe.size()) - 0.5) * pi);
+                plain[i / per_bin] += lobe[i], cosine[i / per_bin] += lobe[i] * c;
+                sum += lobe[i], cosine_sum += lobe[i] * c;
+            }
+            for (double& x : plain) x /= sum * pi / double(theta_bins);
+            for (double& x : cosine) x /= cosine_sum * pi / double(theta_bins);
+            M[authors][side] = std::move(plain), M[2 + authors][side] = std::move(cosine);
         }
-        for (const int k : {0, 1})
-            for (double& x : M[k][side]) x /= sum[k] * pi / double(theta_bins);
     }
     for (std::size_t t = 0; t < theta_bins; ++t)
         for (std::size_t b = 0; b < fine; ++b) {
             const double phi = std::abs(((double(b) + 0.5) / double(fine) - 0.5) * 2 * pi), forward = phi / pi;
             const std::size_t bin = t * phi_bins + b * phi_bins / fine;
             const double share = N[b] * double(phi_bins) / double(fine);
-            m.scattered.value[bin] += share * ((1 - forward) * M[0][0][t] + forward * M[0][1][t]);
-            m.with_cosine.value[bin] += share * ((1 - forward) * M[1][0][t] + forward * M[1][1][t]);
+            for (int k = 0; k < longitudinal_count; ++k)
+                m.scattered[k].value[bin] += share * ((1 - forward) * M[k][0][t] + forward * M[k][1][t]);
         }
     return m;
 }

@@ -39,6 +39,7 @@ void validate(const Fibre& f, const Light& light, const FibreOptions& o) {
     require(within(light.h_high, light.h_low, 1), "h_high", "a value in [h_low, 1]", light.h_high);
     require(std::isfinite(light.azimuth), "azimuth", "finite radians", light.azimuth);
     require(within(double(o.paths), 1, 0x1p40), "paths", "1 to 2^40", double(o.paths));
+    require(within(o.target_error, 0, 1), "target_error", "a value in [0, 1]", o.target_error);
     require(within(double(o.batches), 2, 1024), "batches", "2 to 1024", double(o.batches));
     require(within(double(o.theta_bins), 1, 4096), "theta_bins", "1 to 4096", double(o.theta_bins));
     require(within(double(o.phi_bins), 1, 4096), "phi_bins", "1 to 4096", double(o.phi_bins));

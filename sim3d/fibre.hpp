@@ -61,6 +61,9 @@ struct Light {
 /// Work, randomness and bins of one simulation.
 struct FibreOptions {
     std::uint64_t paths = 1000000;  ///< shared out among the batches, rounded up; 1 to 2^40
+    /// Stop when the scattered light's density (first channel) has this relative L2 error; 0: spend
+    /// all paths. The fast tracer's alone.
+    double target_error = 0;
     std::uint64_t seed = 1;
     std::uint64_t cell = 0;                       ///< which cell: another cell gets other random numbers
     std::size_t batches = 16;                     ///< independent estimates that the errors come from, 2 to 1024

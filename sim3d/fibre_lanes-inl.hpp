@@ -167,12 +167,9 @@ std::size_t Enter(LaneFibre& st, std::size_t count) {
         const VU index =
             hn::Add(hn::Iota(u, static_cast<std::uint32_t>(i)), hn::Set(u, static_cast<std::uint32_t>(st.first)));
         const Words4 a = DrawWords(counter, st.key, index);
-        // The stratum's number is exact to 24 bits, more than that a batch of lanes shares.
         const VF within =
             hn::Add(hn::ConvertTo(f, hn::BitCast(I(), hn::Iota(u, static_cast<std::uint32_t>(i)))), Uniform23(a.a));
-        const VF share =
-            hn::MulAdd(within, Constant(st.stratum),
-                       Constant(static_cast<float>(static_cast<double>(st.first) / static_cast<double>(st.paths))));
+        const VF share = hn::MulAdd(within, Constant(st.stratum), Constant(st.first_stratum));
         const VF h =
             hn::Max(hn::Min(hn::MulAdd(share, Constant(st.h_span), Constant(st.h_low)), Constant(1)), Constant(-1));
         const VF half = hn::Sqrt(hn::Mul(hn::Sub(Constant(1), h), hn::Add(Constant(1), h)));

@@ -40,8 +40,8 @@ struct LaneFibre {
     std::uint32_t theta_bins, phi_bins;
     std::uint64_t seed, cell;
     std::uint32_t key[2], batch = 0;
-    float stratum = 0;  ///< 1 / paths of the batch
-    std::uint64_t first = 0, paths = 0;
+    std::uint64_t first = 0;               ///< number in the batch of the first path of these lanes
+    float stratum = 0, first_stratum = 0;  ///< width of a stratum of h, of [0, 1], and where theirs begin
 
     LaneRays rays;
     FibreSums* sums = nullptr;

@@ -15,6 +15,12 @@ double DirectionalDensity::bin_area() const {
     return pi / static_cast<double>(theta_bins) * (2 * pi / static_cast<double>(phi_bins));
 }
 
+double DirectionalDensity::relative_error() const {
+    double errors = 0, values = 0;
+    for (std::size_t i = 0; i < value.size(); ++i) errors += error[i] * error[i], values += value[i] * value[i];
+    return values > 0 ? std::sqrt(errors / values) : 0;
+}
+
 FibreSums::FibreSums(const Fibre& fibre, const FibreOptions& options)
     : bins(class_count * fibre.sigma_ca.size() * options.theta_bins * options.phi_bins, 0.0),
       sigma_ca_(fibre.sigma_ca),

@@ -45,7 +45,8 @@ struct Estimate {
 struct DirectionalDensity {
     std::size_t theta_bins = 0, phi_bins = 0;
     std::vector<double> value, error;
-    double bin_area() const;  ///< [radians^2]
+    double bin_area() const;        ///< [radians^2]
+    double relative_error() const;  ///< |error| / |value| over the bins; 0 where there is no light
 };
 
 /// Light that left, of one batch of paths. One object belongs to one thread.

@@ -27,8 +27,9 @@ HWY_EXPORT(TraceLanes);
 HWY_EXPORT(FibreTarget);
 
 namespace {
-constexpr std::size_t kBatch = 4096;  // paths followed together; their arrays fit the second cache
-}
+constexpr std::size_t kBatch = 4096;    // paths followed together; their arrays fit the second cache
+constexpr std::uint64_t kFirst = 1024;  // paths of a batch before the error is looked at
+}  // namespace
 
 LaneFibre::LaneFibre(const Fibre& fibre, const Light& light, const FibreOptions& options)
     : surface(fibre), seed(options.seed), cell(options.cell) {
@@ -72,15 +73,33 @@ FibreProfile trace_fibre(const Fibre& fibre, const Light& light, const FibreOpti
         throw std::invalid_argument("batches: expected 2 to 256 of at most 2^32 paths");
     std::vector<FibreSums> batches(options.batches, FibreSums(fibre, options));
     const LaneFibre lanes(fibre, light, options);
+    const auto follow = [&](std::uint64_t done, std::uint64_t count) {
 #pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t b = 0; b < options.batches; ++b) {
-        LaneFibre mine = lanes;
-        mine.sums = &batches[b], mine.batch = static_cast<std::uint32_t>(b);
-        mine.paths = batches[b].paths = each, mine.stratum = static_cast<float>(1 / static_cast<double>(each));
-        for (mine.first = 0; mine.first < each; mine.first += kBatch) HWY_DYNAMIC_DISPATCH(TraceLanes)
-        (mine, static_cast<std::size_t>(std::min<std::uint64_t>(kBatch, each - mine.first)), FibreWalker::most_flights);
+        for (std::size_t b = 0; b < options.batches; ++b) {
+            LaneFibre mine = lanes;
+            mine.sums = &batches[b], mine.batch = static_cast<std::uint32_t>(b);
+            mine.stratum = static_cast<float>(1 / static_cast<double>(count));
+            for (std::uint64_t i = 0; i < count; i += kBatch) {
+                mine.first = done + i;
+                mine.first_stratum = static_cast<float>(static_cast<double>(i) / static_cast<double>(count));
+                const auto n = static_cast<std::size_t>(std::min<std::uint64_t>(kBatch, count - i));
+                HWY_DYNAMIC_DISPATCH(TraceLanes)(mine, n, FibreWalker::most_flights);
+            }
+            batches[b].paths += count;
+        }
+    };
+    if (!(options.target_error > 0)) {
+        follow(0, each);
+        return {fibre, options, std::move(batches)};
     }
-    return {fibre, options, std::move(batches)};
+    // Rounds that double the paths, each with strata of its own.
+    for (std::uint64_t done = 0;;) {
+        const std::uint64_t next = std::min(each, done == 0 ? kFirst : 2 * done);
+        follow(done, next - done);
+        done = next;
+        FibreProfile profile(fibre, options, batches);
+        if (done == each || profile.density(scattered).relative_error() <= options.target_error) return profile;
+    }
 }
 
 const char* fibre_tracer_target() { return HWY_DYNAMIC_DISPATCH(FibreTarget)(); }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "medulla/config.hpp"
 #include "medulla/phase.hpp"
@@ -136,6 +137,7 @@ PathExit FibreWalker::follow(double h, RandomStream& random) const {
 
 FibreProfile walk_fibre(const Fibre& fibre, const Light& light, const FibreOptions& options) {
     validate(fibre, light, options);
+    if (options.target_error > 0) throw std::invalid_argument("target_error: expected 0, the fast tracer has it");
     const FibreWalker walker(fibre, light);
     const std::uint64_t each = (options.paths + options.batches - 1) / options.batches;
     std::vector<FibreSums> batches(options.batches, FibreSums(fibre, options));

@@ -165,3 +165,29 @@ TEST_CASE("Fibre tracer: two indices are the reference implementation's", "[sim3
     f.eta_m = 1.3;
     CHECK_THROWS_AS(trace_fibre(f, {}, with(64)), std::invalid_argument);
 }
+
+TEST_CASE("Fibre tracer: stops at its target error, which is the distance from a longer run", "[sim3d]") {
+    const Case c = cases()[1];
+    FibreOptions o = with(40000000);
+    o.target_error = 0.03;
+    const FibreProfile r = trace_fibre(c.fibre, c.light, o);
+    const auto d = r.density(scattered);
+    CHECK(d.relative_error() <= 0.03);
+    CHECK(r.paths() < 4000000);
+    o.target_error = 0, o.paths = 4 * r.paths(), o.seed = 77;
+    const auto longer = trace_fibre(c.fibre, c.light, o).density(scattered);
+    double distance = 0, norm = 0;
+    for (std::size_t i = 0; i < d.value.size(); ++i) {
+        distance += (d.value[i] - longer.value[i]) * (d.value[i] - longer.value[i]);
+        norm += longer.value[i] * longer.value[i];
+    }
+    // Both runs' errors; some 600 bins: the ratio's own deviation is about 4 %.
+    const double ratio = std::sqrt(distance / norm) / std::hypot(d.relative_error(), longer.relative_error());
+    CHECK(ratio > 0.8);
+    CHECK(ratio < 1.2);
+    // The most that may be spent is kept to.
+    o = with(10000);
+    o.target_error = 1e-6;
+    CHECK(trace_fibre(c.fibre, c.light, o).paths() == 10048);
+    CHECK_THROWS_AS(walk_fibre(c.fibre, c.light, o), std::invalid_argument);
+}

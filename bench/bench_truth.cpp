@@ -114,6 +114,8 @@ int main(int argc, char** argv) {
         for (const double A : model.energy) std::printf(" %.3f", A), row["model"].push_back(A);
         std::printf(" | %.3f(%.0f) %.3f\n", white_truth.value, std::ceil(white_truth.error * 1e3), white_energy);
 
+        out["animals"].push_back(row);
+        if (!(model.energy[3] > 0)) continue;  // one ray that misses the medulla
         const DirectionalDensity lobe = truth.density(scattered, 0, !h);
         const DirectionalDensity& published = model.scattered[int(Longitudinal::house)];
         const DirectionalDensity& cosine = model.scattered[int(Longitudinal::house_cosine)];
@@ -132,12 +134,11 @@ int main(int argc, char** argv) {
                                              relative_distance(published, lobe),
                                              relative_distance(scaled[0], lobe),
                                              relative_distance(scaled[1], lobe)};
-        row["shape"] = numbers;
+        out["animals"].back()["shape"] = numbers;
         std::printf("%-9s | %.3f %.3f %.3f %.3f | %.3f %.3f | %.3f | %.3f | %.2f %.2f %.2f\n", "", numbers[0],
                     numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8],
                     numbers[9], numbers[10]);
         std::fflush(stdout);
-        out["animals"].push_back(row);
     }
     if (!json.empty()) std::ofstream(json) << out.dump(1) << '\n';
 }

@@ -43,6 +43,8 @@ void validate(const Fibre& f, const Light& light, const FibreOptions& o) {
     require(within(double(o.batches), 2, 1024), "batches", "2 to 1024", double(o.batches));
     require(within(double(o.theta_bins), 1, 4096), "theta_bins", "1 to 4096", double(o.theta_bins));
     require(within(double(o.phi_bins), 1, 4096), "phi_bins", "1 to 4096", double(o.phi_bins));
+    const double sums = 7.0 * double(f.sigma_ca.size()) * double(o.batches * o.theta_bins * o.phi_bins);
+    require(sums <= 0x1p31, "theta_bins, phi_bins", "at most 2^31 sums over all classes, channels and batches", sums);
 }
 
 }  // namespace medulla::sim3d

@@ -30,7 +30,7 @@ struct LaneFibre {
     LaneFibre(const Fibre& fibre, const Light& light, const FibreOptions& options);
 
     CuticleSurface surface;
-    float kappa2, ring;  ///< kappa^2 and 1 - kappa^2
+    float ring;  ///< 1 - kappa^2
     float sigma_ms, g, layers, eta, excess, tilt, along, around;
     float stretch, sin_azimuth, cos_azimuth;
     float travel_x, travel_y, travel_z, entry_y, entry_z, across_y, across_z, h_low, h_span;

@@ -34,7 +34,7 @@ constexpr std::uint64_t kFirst = 1024;  // paths of a batch before the error is 
 LaneFibre::LaneFibre(const Fibre& fibre, const Light& light, const FibreOptions& options)
     : surface(fibre), seed(options.seed), cell(options.cell) {
     const auto number = [](double x) { return static_cast<float>(x); };
-    kappa2 = number(fibre.kappa * fibre.kappa), ring = number((1 - fibre.kappa) * (1 + fibre.kappa));
+    ring = number((1 - fibre.kappa) * (1 + fibre.kappa));
     sigma_ms = number(fibre.sigma_ms), g = number(fibre.g), layers = number(fibre.layers);
     eta = number(fibre.eta_c), excess = number((fibre.eta_c - 1) * (fibre.eta_c + 1));
     tilt = number(surface.tilt()), along = number(surface.slope_along()), around = number(surface.slope_around());

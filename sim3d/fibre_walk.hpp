@@ -28,7 +28,6 @@ class FibreWalker {
     PathExit follow(double h, sim2d::RandomStream& random) const;
 
   private:
-    struct Ray;
     Vec3 normal(double y, double z) const;
     void collide(Vec3& d, sim2d::RandomStream& random) const;
     bool crosses(Vec3& d, Vec3 n, double ratio, sim2d::RandomStream& random) const;

@@ -400,5 +400,7 @@ TEST_CASE("Fibre: a bad parameter is named", "[sim3d]") {
     FibreOptions o;
     o.batches = 1;
     CHECK(message(Fibre(), {}, o) == "batches: expected 2 to 1024, found 1");
+    o.batches = 1024, o.theta_bins = o.phi_bins = 4096;
+    CHECK(message(Fibre(), {}, o).rfind("theta_bins, phi_bins: expected at most 2^31 sums", 0) == 0);
     CHECK(message(Fibre(), from(pi / 2), {}).rfind("theta_i: expected radians in (-pi/2, pi/2)", 0) == 0);
 }

@@ -62,12 +62,10 @@ CpResult cp_fibres(const Tensor& tensor, bool nonnegative) {
         if (nonnegative) fit.factors[longest] = fit.factors[longest].cwiseMax(0);
         fit.weights = Eigen::VectorXd::Constant(fit.factors[0].cols(), 1 / input.norm());
         for (std::size_t k = 0; k < fit.factors.size(); ++k) fit.factors[k] = (hosvd.bases[k] * fit.factors[k]).eval();
-        result.model = to_model(fit, input);
-        result.report.stop = Stop::exact;
-        result.report.core = shape;
+        fit.stop = Stop::exact;
+        store(fit, input, shape, result);
         result.report.truncation_error = hosvd.error;
         result.report.relative_error = relative_error(tensor, result.model);
-        result.report.degeneracy = degeneracy(result.model, input.restore(1));
     }
     result.report.solver = "fibres";
     result.report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

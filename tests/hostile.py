@@ -171,7 +171,7 @@ class Hostile(unittest.TestCase):
         self.lie(lambda f: f.attrs.__setitem__("format", numpy.bytes_("other")), "format", seal=False)
         self.lie(lambda f: f.attrs.__delitem__("sha256"), "sha256", seal=False)
         self.lie(lambda f: f.attrs.__setitem__("sha256", numpy.bytes_("0" * 64)), "SHA-256", seal=False)
-        self.lie(lambda f: f.attrs.__setitem__("program", "text of any length"), "program", seal=False)
+        self.lie(lambda f: f.attrs.__setitem__("program", "x" * 65537), "program", "65536 bytes", seal=False)
         self.lie(lambda f: f["azimuthal"].attrs.__setitem__("seed", 1.5), "seed", seal=False)
 
     def test_declared_but_not_there(self):
@@ -230,6 +230,18 @@ class Hostile(unittest.TestCase):
         # Nodes are for information, but programs make a lobe of each.
         for axis, nodes in ((0, 0xffffffff), (3, 0xffffffff), (3, 0)):
             lie("nodes", offset=axes + 32 * axis + 4, value=whole(nodes))
+        # Numbers that a pack with the error that it states cannot have: a share of energy of 1.5 or -0.5, and lobes of which
+        # one component has the wrong sign.
+        count, = struct.unpack_from("<I", self.pack, 12)
+        kinds = {struct.unpack_from("<I", self.pack, at)[0]: at for at in range(table, table + 296 * count, 296)}
+        numbers = struct.unpack_from("<I", self.pack, kinds[3] + 20)[0]
+        ranks = struct.unpack_from("<I", self.pack, kinds[3] + 12)[0]
+        shares = struct.unpack_from(f"<{ranks}f", self.pack, numbers)
+        for factor in (3, -1):
+            lie("share", offset=numbers, value=struct.pack(f"<{ranks}f", *(factor * x for x in shares)), commands=("verify",))
+        for kind in (0, 1, 2):
+            at = struct.unpack_from("<I", self.pack, kinds[kind] + 20)[0] + 4
+            lie("below 0", offset=at, value=struct.pack("<f", -struct.unpack_from("<f", self.pack, at)[0]), commands=("verify",))
         for text in (b"[" * 500000 + b"]" * 500000, b"{", b"", b'"\xff"'):
             lie("provenance", "JSON", text=text, commands=("info",))
 

@@ -11,7 +11,8 @@ namespace {
 
 using PerMode = std::vector<double>;
 
-const std::size_t block_rows = 32;  ///< a block of a field stays in the first cache over all basis vectors
+const std::size_t block_rows =
+    32;  ///< so that a block of a field stays in the first-level cache over all basis vectors
 
 /// products[i][k] = sum over rows of x y_i, i < count; within a block in DiscReal, over blocks in double.
 void dots(const DiscField& x, const std::vector<DiscField>& y, std::size_t count, std::size_t stride,
@@ -66,10 +67,10 @@ DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t
     const std::size_t size = right_side.size();
     std::vector<DiscField> basis;
     basis.push_back(std::move(right_side));
-    // Modes do not couple: each has its own Krylov space and rotation, but all share the passes over memory.
+    // Modes do not couple: each has its own Krylov space and rotations, but all share the passes over memory.
     PerMode norm = square(basis[0], stride, stride), scale(stride, 0.0);
     for (double& n : norm) n = std::sqrt(n);
-    scale[0] = norm[0];  // the path length has a scale of its own
+    scale[0] = norm[0];  // column 0, the path length, has its own scale
     std::fill(scale.begin() + 1, scale.end(), *std::max_element(norm.begin() + 1, norm.end()));
     std::vector<PerMode> column(most * (most + 1), PerMode()), cosine, sine, right(1, norm);
     const auto h = [&](std::size_t i, std::size_t j) -> PerMode& { return column[j * (most + 1) + i]; };
@@ -90,7 +91,7 @@ DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t
         apply(basis[j], next, active);
         for (std::size_t at = 0; at < next.size(); at += stride)
             for (std::size_t k = 0; k < active; ++k) next[at + k] = basis[j][at + k] - next[at + k];
-        // Classical Gram-Schmidt: two passes over the basis. What it loses in orthogonality costs steps, not accuracy.
+        // Classical Gram-Schmidt: two passes over the basis. Its loss of orthogonality costs steps, not accuracy.
         dots(next, basis, j + 1, stride, active, &h(0, j));
         subtract_all(next, basis, j + 1, active, &h(0, j));
         PerMode length = square(next, stride, active);
@@ -132,7 +133,8 @@ DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t
             for (std::size_t c = i + 1; c < steps[k]; ++c) value -= h(i, c)[k] * weight[c][k];
             weight[i][k] = value / h(i, i)[k];
         }
-        if (steps[k] == 0) weight[0][k] = norm[k];  // below the tolerance from the start: its right side
+        if (steps[k] == 0)
+            weight[0][k] = norm[k];  // below the tolerance from the start: the solution is the right side
     }
     for (PerMode& w : weight)
         for (double& x : w) x = -x;

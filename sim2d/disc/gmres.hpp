@@ -1,4 +1,4 @@
-// GMRES (Saad and Schultz 1986) on the columns of a field, each a linear system of its own.
+// GMRES (Saad and Schultz 1986) on the columns of a field; each column is an independent linear system.
 #pragma once
 
 #include <functional>
@@ -11,8 +11,8 @@ struct DiscIteration {
     DiscField solution;
     int iterations = 0;
     double residual = 0;    ///< of the worst column; column 0 against itself, the others against the largest of them
-    bool converged = true;  ///< false: the steps ran out
-    double left = 0;  ///< where they did: norm of the residual over that of the solution, of column 0 or of the others
+    bool converged = true;  ///< false: stopped by the limit of steps
+    double left = 0;  ///< then: norm of the residual / norm of the solution, the larger of column 0 and the others
 };
 
 /// out = A in for columns [0, active), active a multiple of 8.

@@ -11,7 +11,7 @@
 namespace medulla::sim2d {
 namespace {
 
-/// High modes fade into denormals, which cost 100 cycles each: rounds them to zero while alive.
+/// High modes decay into denormals, which cost 100 cycles each: flushes them to zero in its lifetime.
 class FlushDenormals {
   public:
 #if defined(__SSE2__)
@@ -27,8 +27,8 @@ class FlushDenormals {
 #endif
 };
 
-/// What (1 - A)^-1 makes of a residual at most, about: the collisions to come of the light that stays longest, by
-/// diffusion 2 sigma^2 (1 - g) / j^2, j = 2.405 the first zero of J0, and those of light that goes straight on.
+/// Approximate norm of (1 - A)^-1: the expected number of further collisions, 2 sigma^2 (1 - g) / j^2 by diffusion of
+/// the slowest mode, j = 2.405 the first zero of J0, plus those of light that travels straight.
 double amplification(double g, double sigma) { return 1 + 2 * sigma + 0.346 * sigma * sigma * (1 - g); }
 
 /// Every row's column 0: to = a x + b y.

@@ -19,7 +19,7 @@ static std::uint32_t word_at(std::size_t offset) {
     return word;
 }
 
-/// The pack with one word replaced and its checksum mended is refused for the reason given.
+/// Checks that the pack with one word replaced and a corrected checksum is refused for the given reason.
 static void refuse(const char* what, std::size_t offset, std::uint32_t word, PackStatus reason) {
     std::vector<unsigned char> bytes = pack;
     std::memcpy(bytes.data() + offset, &word, sizeof word);

@@ -1,5 +1,5 @@
-// Everything that a renderer does with an open pack: what open_pack accepts must survive it, and give finite numbers.
-// For mutation tests and fuzzers; rests on the runtime alone.
+// Everything that a renderer does with an open pack. Any pack that open_pack accepts must give finite numbers.
+// For mutation tests and fuzzers; uses the runtime only.
 #pragma once
 
 #include <cmath>
@@ -14,15 +14,15 @@ namespace medulla::testing {
 
 namespace detail {
 
-/// By its bits, so that -ffast-math cannot pass it. Densities and energies of any pack are finite and not negative.
+/// Tests bits, which -ffast-math cannot optimise away. Densities and energies of any pack are finite and not negative.
 inline bool is_density(float x) {
     std::uint32_t bits;
     std::memcpy(&bits, &x, sizeof bits);
     return bits < 0x7f800000u || bits == 0x80000000u;
 }
 
-/// Looks the tables up one by one, within their axes and beyond. Roots are taken of sigma and of 1 - h^2, so negative
-/// ones have no answer: they are looked up all the same.
+/// Looks up each table inside and outside its axes. Square roots of sigma and 1 - h^2 are NaN for negative arguments,
+/// so those results are not checked.
 inline const char* exercise_tables(const PackView& pack) {
     for (const float sigma : {0.0f, 1e-30f, 0.7f, 16.0f, 1e30f, -1.0f})
         for (const float other : {0.0f, 0.6f, 1.0f, -0.3f, -2.0f}) {
@@ -71,7 +71,7 @@ const char* exercise_sampler(const Sampler& sampler) {
     return nullptr;
 }
 
-/// Near and far field, one by one and in batches, from the fibre as it is.
+/// Near and far field of a fibre, single queries and batches.
 inline const char* exercise_fibre(const FurFibre<1>& fibre) {
     float theta_r[16], phi[16], theta_i[16], h[16];
     for (int i = 0; i < 16; ++i) {
@@ -109,7 +109,7 @@ inline const char* exercise_fibre(const FurFibre<1>& fibre) {
 }  // namespace detail
 
 /// Evaluates and samples every table, and fibres of several materials, from factors and from dense tables.
-/// @return what was not finite or below 0; empty: nothing
+/// @return description of the first value that is not finite or below 0, empty if none
 inline std::string exercise(const PackView& pack) {
     if (const char* wrong = detail::exercise_tables(pack)) return wrong;
     static const auto dense = std::make_unique<UnfoldedTables>();

@@ -1,8 +1,7 @@
 // furtable plot and furtable export: pictures of lobes, and packs and tables in other programs' forms.
 #include <fmt/core.h>
 
-#include <cmath>
-#include <cstdio>
+#include <algorithm>
 #include <cstring>
 #include <optional>
 
@@ -10,6 +9,7 @@
 #include "tables/pack/glsl.hpp"
 #include "tables/programs/commands.hpp"
 #include "tables/programs/lobe_figure.hpp"
+#include "tables/programs/number.hpp"
 #include "tables/store/file.hpp"
 #include "tables/store/json_text.hpp"
 #include "tables/store/output.hpp"
@@ -22,14 +22,13 @@ struct PlotWords {
     std::string output;
 };
 
-/// "SIGMA:G", or what is wrong with it.
+/// The point that "SIGMA:G" names. Throws UsageError.
 PlotPoint plot_point(const std::string& text) {
-    PlotPoint point{};
-    int read = 0;
-    if (std::sscanf(text.c_str(), "%lf:%lf%n", &point.sigma, &point.g, &read) != 2 ||
-        static_cast<std::size_t>(read) != text.size() || !std::isfinite(point.sigma) || !std::isfinite(point.g))
-        throw UsageError("plot: --at expected SIGMA:G, such as 2:0.7, found '{}'", text);
-    return point;
+    const std::size_t colon = std::min(text.find(':'), text.size());
+    const auto sigma = parse_number<double>(text.substr(0, colon)),
+               g = parse_number<double>(text.substr(std::min(colon + 1, text.size())));
+    if (!sigma || !g) throw UsageError("plot: --at expected SIGMA:G, such as 2:0.7, found '{}'", text);
+    return {*sigma, *g};
 }
 
 void run_plot(const PlotWords& words) {

@@ -230,18 +230,20 @@ class Hostile(unittest.TestCase):
         # Nodes are for information, but programs make a lobe of each.
         for axis, nodes in ((0, 0xffffffff), (3, 0xffffffff), (3, 0)):
             lie("nodes", offset=axes + 32 * axis + 4, value=whole(nodes))
-        # Numbers that a pack with the error that it states cannot have: a share of energy of 1.5 or -0.5, and lobes of which
-        # one component has the wrong sign.
+        # Numbers that a pack with the error that it states cannot have: shares of energy above 1 or below 0, and lobes whose odd
+        # part is four times what it was.
         count, = struct.unpack_from("<I", self.pack, 12)
         kinds = {struct.unpack_from("<I", self.pack, at)[0]: at for at in range(table, table + 296 * count, 296)}
         numbers = struct.unpack_from("<I", self.pack, kinds[3] + 20)[0]
         ranks = struct.unpack_from("<I", self.pack, kinds[3] + 12)[0]
         shares = struct.unpack_from(f"<{ranks}f", self.pack, numbers)
-        for factor in (3, -1):
+        for factor in (3, -0.3):
             lie("share", offset=numbers, value=struct.pack(f"<{ranks}f", *(factor * x for x in shares)), commands=("verify",))
         for kind in (0, 1, 2):
-            at = struct.unpack_from("<I", self.pack, kinds[kind] + 20)[0] + 4
-            lie("below 0", offset=at, value=struct.pack("<f", -struct.unpack_from("<f", self.pack, at)[0]), commands=("verify",))
+            even, odd, stride, _, numbers = struct.unpack_from("<5I", self.pack, kinds[kind] + 4)
+            first, count = numbers + 4 * ((even + 7) // 8 * 8), stride - (even + 7) // 8 * 8
+            turned = [4 * x for x in struct.unpack_from(f"<{count}f", self.pack, first)]
+            lie("below 0", offset=first, value=struct.pack(f"<{count}f", *turned), commands=("verify",))
         for text in (b"[" * 500000 + b"]" * 500000, b"{", b"", b'"\xff"'):
             lie("provenance", "JSON", text=text, commands=("info",))
 

@@ -127,7 +127,7 @@ class Hostile(unittest.TestCase):
         for table in ("azimuthal", "longitudinal"):
             for name in ("lobe", "energy", "energy_error", "standard_error", "mean_length"):
                 self.false_file(put(f"{table}/{name}", float("nan")), f"/{table}/{name}", "finite")
-                self.false_file(put(f"{table}/{name}", -1), f"/{table}", ">= 0", "found -1")
+                self.false_file(put(f"{table}/{name}", -1), f"/{table}", "[0, 1]" if name == "energy" else ">= 0", "found -1")
             for name in ("lobe", "energy", "standard_error"):
                 self.false_file(put(f"{table}/{name}", float("inf")), f"/{table}/{name}", "finite")
             self.false_file(put(f"{table}/lobe", 3), f"/{table}", "integral 1")
@@ -230,6 +230,21 @@ class Hostile(unittest.TestCase):
         # The runtime does not use node counts, but programs evaluate one lobe per node.
         for axis, nodes in ((0, 0xffffffff), (3, 0xffffffff), (3, 0)):
             false_pack("nodes", offset=axes + 32 * axis + 4, value=whole(nodes))
+        # Numbers that contradict the error that the pack states: shares of energy above 1 or below 0, and lobes with an odd
+        # part four times too large.
+        count, = struct.unpack_from("<I", self.pack, 12)
+        kinds = {struct.unpack_from("<I", self.pack, at)[0]: at for at in range(table, table + 296 * count, 296)}
+        numbers = struct.unpack_from("<I", self.pack, kinds[3] + 20)[0]
+        ranks = struct.unpack_from("<I", self.pack, kinds[3] + 12)[0]
+        shares = struct.unpack_from(f"<{ranks}f", self.pack, numbers)
+        for factor in (3, -0.3):
+            false_pack("share", offset=numbers, value=struct.pack(f"<{ranks}f", *(factor * x for x in shares)),
+                       commands=("verify",))
+        for kind in (0, 1, 2):
+            even, odd, stride, _, numbers = struct.unpack_from("<5I", self.pack, kinds[kind] + 4)
+            first, count = numbers + 4 * ((even + 7) // 8 * 8), stride - (even + 7) // 8 * 8
+            larger = [4 * x for x in struct.unpack_from(f"<{count}f", self.pack, first)]
+            false_pack("undershoot", offset=first, value=struct.pack(f"<{count}f", *larger), commands=("verify",))
         for text in (b"[" * 500000 + b"]" * 500000, b"{", b"", b'"\xff"'):
             false_pack("provenance", "JSON", text=text, commands=("info",))
 

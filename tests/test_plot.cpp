@@ -64,7 +64,7 @@ TEST_CASE("A logarithmic axis refuses what has no logarithm", "[plot]") {
     CHECK_THROWS(log_axis("", 1, NAN));
 }
 
-TEST_CASE("A symmetric axis contains its reach; of 0 it is still an axis", "[plot]") {
+TEST_CASE("A symmetric axis contains its reach and of 0 it is still an axis", "[plot]") {
     for (const double reach : {0.0, 1e-9, 0.013, 0.2, 7.0, 300.0}) {
         const Axis axis = symmetric_axis("", reach);
         CHECK(axis.low == -axis.high);

@@ -12,6 +12,7 @@ ROOMS = {
     "sim2d/slab": {"sim2d"},
     "sim2d/reference": {"sim2d", "sim2d/slab"},
     "sim2d/tracer": {"sim2d", "sim2d/disc", "sim2d/slab"},
+    "sim3d": {"runtime/include/medulla", "sim2d", "sim2d/tracer"},
     "tensor": set(),
     "plot": set(),
     "tables": set(),

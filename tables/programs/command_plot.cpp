@@ -1,7 +1,7 @@
 // furtable plot and furtable export: pictures of lobes, and packs and tables in other programs' forms.
 #include <fmt/core.h>
 
-#include <cmath>
+#include <algorithm>
 #include <cstring>
 #include <optional>
 
@@ -10,6 +10,8 @@
 #include "tables/programs/commands.hpp"
 #include "tables/programs/lobe_figure.hpp"
 #include "tables/programs/number.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/json_text.hpp"
 #include "tables/store/output.hpp"
 
 namespace medulla::tables {
@@ -20,10 +22,11 @@ struct PlotWords {
     std::string output;
 };
 
-/// "SIGMA:G", or what is wrong with it.
+/// The point that "SIGMA:G" names. Throws UsageError.
 PlotPoint plot_point(const std::string& text) {
-    const std::size_t colon = std::min(text.find(':'), text.size() - 1);
-    const auto sigma = parse_number<double>(text.substr(0, colon)), g = parse_number<double>(text.substr(colon + 1));
+    const std::size_t colon = std::min(text.find(':'), text.size());
+    const auto sigma = parse_number<double>(text.substr(0, colon)),
+               g = parse_number<double>(text.substr(std::min(colon + 1, text.size())));
     if (!sigma || !g) throw UsageError("plot: --at expected SIGMA:G, such as 2:0.7, found '{}'", text);
     return {*sigma, *g};
 }

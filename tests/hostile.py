@@ -127,7 +127,8 @@ class Hostile(unittest.TestCase):
         for table in ("azimuthal", "longitudinal"):
             for name in ("lobe", "energy", "energy_error", "standard_error", "mean_length"):
                 self.false_file(put(f"{table}/{name}", float("nan")), f"/{table}/{name}", "finite")
-                self.false_file(put(f"{table}/{name}", -1), f"/{table}", ">= 0", "found -1")
+                least = "in [0, 1]" if name == "energy" else ">= 0"
+                self.false_file(put(f"{table}/{name}", -1), f"/{table}", least, "found -1")
             for name in ("lobe", "energy", "standard_error"):
                 self.false_file(put(f"{table}/{name}", float("inf")), f"/{table}/{name}", "finite")
             self.false_file(put(f"{table}/lobe", 3), f"/{table}", "integral 1")

@@ -342,7 +342,7 @@ class Programs(unittest.TestCase):
         self.assertEqual(set(errors), {"azimuthal", "longitudinal back", "longitudinal forward"})
         same = json.loads(run("furtable", "diff", self.path("t.h5"), self.path("t.h5"), "--json")[1])["errors"]
         self.assertEqual(max(e["relative_l2"] for e in same.values()), 0)
-        other = ["50" if arg == "72" else arg for word in SMALL]
+        other = ["50" if word == "72" else word for word in SMALL]
         self.assertEqual(run("medulla-precompute", "-o", self.path("bins.h5"), *other)[0], 0)
         self.fails(1, "furtable", "diff", "t.h5", "bins.h5", names=["t.h5", "bins.h5", "72 bins", "50"])
         import numpy

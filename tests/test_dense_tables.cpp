@@ -202,8 +202,8 @@ TEST_CASE("C^M integrates to 1 as it is read, dips held at 0 and all", "[bcsdf]"
                 longitudinal_at(factors, x, m);
                 if (!m.valid) continue;
                 double& off = exact ? factors_off : signed_over;
-                off = std::max(off, std::abs(double(held_integral(factors.back.view, m.back)) - 1));
-                off = std::max(off, std::abs(double(held_integral(factors.forward.view, m.forward)) - 1));
+                off = std::max(off, std::abs(double(clamped_integral(factors.back.view, m.back)) - 1));
+                off = std::max(off, std::abs(double(clamped_integral(factors.forward.view, m.forward)) - 1));
             }
         }
     }

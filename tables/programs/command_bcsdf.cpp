@@ -7,6 +7,8 @@
 #include "medulla/medulla.hpp"
 #include "tables/job/material.hpp"
 #include "tables/programs/commands.hpp"
+#include "tables/programs/number.hpp"
+#include "tables/store/json_text.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -21,17 +23,16 @@ struct BcsdfOptions {
 Offsets offsets_of(const BcsdfOptions& options) {
     if (options.far) return {-1, 1};
     if (*options.h_given) {
-        if (!(options.h >= -1 && options.h <= 1)) throw UsageError("--h: expected a value in [-1, 1], found {:g}", options.h);
+        if (!(options.h >= -1 && options.h <= 1))
+            throw UsageError("--h: expected a value in [-1, 1], found {:g}", options.h);
         return {static_cast<float>(options.h), static_cast<float>(options.h)};
     }
-    const std::size_t colon = options.range.find(':');
-    char* end = nullptr;
-    const double low = std::strtod(options.range.c_str(), &end);
-    const bool low_ok = colon != std::string::npos && end == options.range.c_str() + colon && colon > 0;
-    const double high = low_ok ? std::strtod(options.range.c_str() + colon + 1, &end) : 0;
-    if (!low_ok || *end != 0 || !(-1 <= low && low <= high && high <= 1))
+    const std::size_t colon = std::min(options.range.find(':'), options.range.size() - 1);
+    const auto low = parse_number<double>(options.range.substr(0, colon)),
+               high = parse_number<double>(options.range.substr(colon + 1));
+    if (!low || !high || !(-1 <= *low && *low <= *high && *high <= 1))
         throw UsageError("--h-range: expected A:B with -1 <= A <= B <= 1, found '{}'", options.range);
-    return {static_cast<float>(low), static_cast<float>(high)};
+    return {static_cast<float>(*low), static_cast<float>(*high)};
 }
 
 /// One number for grey fur, three for coloured.
@@ -82,7 +83,6 @@ void run_bcsdf(const BcsdfOptions& options) {
             throw UsageError("{}: expected degrees in {}, found {}", name, range, degrees);
     };
     check("--theta-i", options.theta_i, "(-90, 90)"), check("--theta-r", options.theta_r, "[-90, 90]");
-    if (!std::isfinite(options.phi)) throw UsageError("--phi: expected degrees, found {:g}", options.phi);
     const double phi = std::remainder(options.phi, 360.0);
     const Offsets range = offsets_of(options);
     Material material;
@@ -119,7 +119,7 @@ void run_bcsdf(const BcsdfOptions& options) {
     nlohmann::ordered_json json;
     double sum[3] = {}, density_sum[3] = {};
     if (!options.json)
-        fmt::print("{:<8} {:>12}  {:>12}  {:>12}\n", "lobe", "M [1/rad]", "N [1/rad]", "M N / cos^2 theta_i [1/rad^2]");
+        print("{:<8} {:>12}  {:>12}  {:>12}\n", "lobe", "M [1/rad]", "N [1/rad]", "M N / cos^2 theta_i [1/rad^2]");
     for (int lobe = 0; lobe < count; ++lobe) {
         double N[3], density[3], value[3];
         for (int c = 0; c < 3; ++c) {
@@ -128,21 +128,20 @@ void run_bcsdf(const BcsdfOptions& options) {
             value[c] = density[c] / (cosine * cosine);
             sum[c] += value[c], density_sum[c] += density[c];
         }
-        json["lobes"][lobe_names[lobe]] = {
-            {"M", lobes.M[lobe]},
-            {"N", colour(N, material.grey)},
-            {"value", colour(value, material.grey)},
-            {"density", colour(density, material.grey)}};
+        json["lobes"][lobe_names[lobe]] = {{"M", lobes.M[lobe]},
+                                           {"N", colour(N, material.grey)},
+                                           {"value", colour(value, material.grey)},
+                                           {"density", colour(density, material.grey)}};
         for (int c = 0; c < (material.grey ? 1 : 3) && !options.json; ++c)
-            fmt::print("{:<8} {:>12.6g}  {:>12.6g}  {:>12.6g}\n", c == 0 ? lobe_names[lobe] : "",
-                       static_cast<double>(lobes.M[lobe]), N[c], value[c]);
+            print("{:<8} {:>12.6g}  {:>12.6g}  {:>12.6g}\n", c == 0 ? lobe_names[lobe] : "",
+                  static_cast<double>(lobes.M[lobe]), N[c], value[c]);
     }
     json["sum"] = colour(sum, material.grey);
     json["density"] = colour(density_sum, material.grey);
     if (options.json)
-        fmt::print("{}\n", json.dump());
+        print("{}\n", json_line(json));
     else
-        fmt::print("sum      {:.6g}\n", fmt::join(sum, sum + (material.grey ? 1 : 3), "  "));
+        print("sum      {:.6g}\n", fmt::join(sum, sum + (material.grey ? 1 : 3), "  "));
 }
 
 struct PresetOptions {
@@ -156,10 +155,10 @@ void run_presets(const PresetOptions& options) {
     nlohmann::ordered_json json = nlohmann::ordered_json::array();
     constexpr const char* line = "{:<10} {:>6} {:>6} {:>6} {:>7} {:>7} {:>8} {:>8} {:>8} {:>5} {:>6}\n";
     if (!options.json) {
-        fmt::print(line, "name", "kappa", "eta", "alpha", "beta_m", "beta_n", "sigma_ca", "sigma_ms", "sigma_ma", "g",
-                   "layers");
+        print(line, "name", "kappa", "eta", "alpha", "beta_m", "beta_n", "sigma_ca", "sigma_ms", "sigma_ma", "g",
+              "layers");
         // Sigmas are per fibre radius.
-        fmt::print(line, "", "", "", "deg", "deg", "deg", "1/r", "1/r", "1/r", "", "");
+        print(line, "", "", "", "deg", "deg", "deg", "1/r", "1/r", "1/r", "", "");
     }
     for (const FurPreset& p : fur_presets) {
         json.push_back({{"name", p.name},
@@ -174,10 +173,10 @@ void run_presets(const PresetOptions& options) {
                         {"g", as_printed(p.g)},
                         {"layers", as_printed(p.layers)}});
         if (!options.json)
-            fmt::print(line, p.name, p.kappa, p.eta, p.alpha, p.beta_m, p.beta_n, p.sigma_ca, p.sigma_ms, p.sigma_ma,
-                       p.g, p.layers);
+            print(line, p.name, p.kappa, p.eta, p.alpha, p.beta_m, p.beta_n, p.sigma_ca, p.sigma_ms, p.sigma_ma, p.g,
+                  p.layers);
     }
-    if (options.json) fmt::print("{}\n", nlohmann::ordered_json{{"presets", json}}.dump());
+    if (options.json) print("{}\n", nlohmann::ordered_json{{"presets", json}}.dump());
 }
 
 }  // namespace
@@ -217,7 +216,9 @@ void add_bcsdf(CLI::App& app, Action& action) {
 void add_presets(CLI::App& app, Action& action) {
     add_command<PresetOptions>(
         app, action, "presets", "the animals of Table 4 (angles in degrees, sigma per fibre radius)",
-        [](CLI::App& command, PresetOptions& options) { command.add_flag("--json", options.json, "print one JSON object"); },
+        [](CLI::App& command, PresetOptions& options) {
+            command.add_flag("--json", options.json, "print one JSON object");
+        },
         run_presets);
 }
 

@@ -19,7 +19,8 @@ MEDULLA_FN void evaluate_batch(int count, FibreOf&& fibre_of, const Direction* k
 template <int Channels, class Direction>
 MEDULLA_FN void evaluate_batch(const Fibre<Channels>& fibre, int count, const Direction* known, const float* h,
                                const Direction* drawn, Evaluation<Channels>* result) noexcept {
-    evaluate_batch(count, [&](int) -> const Fibre<Channels>& { return fibre; }, known, h, drawn, result);
+    evaluate_batch(
+        count, [&](int) -> const Fibre<Channels>& { return fibre; }, known, h, drawn, result);
 }
 
 }  // namespace MEDULLA_TARGET

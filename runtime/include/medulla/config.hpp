@@ -1,5 +1,5 @@
-// What every header of the runtime needs: function attributes, and the namespace tag that keeps objects apart which were
-// compiled for different instruction sets.
+// What every header of the runtime needs: function attributes, and the namespace tag that keeps objects apart which
+// were compiled for different instruction sets.
 #pragma once
 
 /// Marks every function of the runtime: inline, and compiled for a GPU as well where the compiler can.

@@ -51,7 +51,10 @@ struct LobeCuts {
 
 template <int Channels = 3>
 struct FarField : detail::FieldBase<Channels> {
-    detail::Incidence<Channels> incidence = {};
+    detail::Inclination<float> inclination = {};
+    detail::Absorption<Channels> absorption = {};
+    float absorbed = 0;     ///< optical radius of absorption, sigma_ma kappa / cos theta_t [1]
+    float known_theta = 0;  ///< [radians]
     float kappa = 0, layers = 0, g = 0;
     int quality = 0;
     LobeMask mask = all_lobes;
@@ -80,8 +83,7 @@ struct FarField : detail::FieldBase<Channels> {
     MEDULLA_FN LobeValues<Channels> lobes(float theta_r, float phi) const noexcept;
     MEDULLA_FN Colour<Channels> eq12(float theta_r, float phi) const noexcept {
         Colour<Channels> sum = angular_density(lobes(theta_r, phi), all_lobes ^ lobe_bit(Lobe::residual));
-        for (int c = 0; this->known.cosine > 0 && c < Channels; ++c)
-            sum[c] /= this->known.cosine * this->known.cosine;
+        for (int c = 0; this->known.cosine > 0 && c < Channels; ++c) sum[c] /= this->known.cosine * this->known.cosine;
         return sum;
     }
     /// The parts of a mean: for each lobe its N, and its share of the probability density over phi.
@@ -94,7 +96,8 @@ struct FarField : detail::FieldBase<Channels> {
     MEDULLA_FN Evaluation<Channels> at(float theta_r, float cosine, float phi) const noexcept;
     MEDULLA_FN Evaluation<Channels> at(const detail::Polar& drawn) const noexcept {
         if (!(this->known.cosine > 0 && drawn.cosine > 0)) return {};
-        return at(drawn.theta, drawn.cosine, detail::azimuth_between(this->known, drawn));
+        const Angles between = detail::angles_between(this->known, drawn);
+        return at(between.theta, drawn.cosine, between.phi);
     }
     MEDULLA_FN Sample<Channels> draw(RandomNumbers u) const noexcept;
 };
@@ -204,7 +207,7 @@ MEDULLA_FN void integrate_piece(const FarField<Channels>& field, int p, float a,
     for (int j = 0; 2 * j < rule.half; ++j) {
         const Four t = rule_nodes(rule, j, middle, half);
         const Offset<Four> at = inside ? offset_inside(field.rim, t) : offset_at_angle(t);
-        visit(trace(field.incidence.at, field.kappa, field.layers, at.h, at.cos_i),
+        visit(trace(field.inclination, field.kappa, field.layers, at.h, at.cos_i),
               rule_weights(rule, j) * Four(half * field.inverse_width) * at.dh);
     }
 }
@@ -213,7 +216,7 @@ MEDULLA_FN void integrate_piece(const FarField<Channels>& field, int p, float a,
 /// of any amplitude(h) D_p(h, phi) is the sum of weight * amplitude(path) * D.
 template <int Channels, class Visit>
 MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float phi, Visit&& visit) noexcept {
-    const Inclination<float>& at = field.incidence.at;
+    const Inclination<float>& at = field.inclination;
     const WrappedGaussian<float> gaussian = field.azimuthal[p];
     const LobeCuts& cuts = field.cuts[p];
     const float s = gaussian.deviation, wide = reach * s;
@@ -224,8 +227,7 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float 
         const float b = cuts.gamma[i];
         const Exit at_b = {cuts.phi[i], cuts.slope[i]};
         float slope = greater(std::abs(at_a.slope), std::abs(at_b.slope));
-        if (a < 0 && b > 0)
-            slope = greater(slope, std::abs(exit_of(p, at.inverse_index, at.index_excess, 0.0f).slope));
+        if (a < 0 && b > 0) slope = greater(slope, std::abs(exit_of(p, at.inverse_index, at.index_excess, 0.0f).slope));
         if (s > wide_deviation) {
             integrate_piece(field, p, a, b, slope / s, [&](const Path<Four>& path, Four weight) {
                 visit(path, weight, gaussian.pdf_of(Four(phi) - centre(path)));
@@ -250,8 +252,7 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float 
                 // The image that is y alone: the others' tails are not within this reach of theirs.
                 integrate_piece(field, p, ga, gb, steepest / s, [&](const Path<Four>& path, Four weight) {
                     const Four z = (Four(y) - centre(path)) * Four(gaussian.inverse);
-                    visit(path, weight,
-                          Four(within_reach * gaussian.peak) * exponential(Four(-0.5f) * z * z));
+                    visit(path, weight, Four(within_reach * gaussian.peak) * exponential(Four(-0.5f) * z * z));
                 });
             }
         }
@@ -262,7 +263,7 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float 
 /// Cuts of R, TT and TRT over [gamma_low, gamma_high].
 template <int Channels>
 MEDULLA_FN void place_cuts(FarField<Channels>& field) noexcept {
-    const Inclination<float>& at = field.incidence.at;
+    const Inclination<float>& at = field.inclination;
     const float low = field.gamma_low, high = field.gamma_high;
     Cuts cuts;
     const auto keep = [&](int p) {
@@ -284,7 +285,7 @@ MEDULLA_FN void place_cuts(FarField<Channels>& field) noexcept {
     keep(0);
     if (field.rim < 1 && field.kappa > 0) both(field.gamma_rim);
     // What a dense medulla lets through leaves next to its rim, over psi ~ 1 / tau.
-    const float tau = field.incidence.absorption.medulla_extinction * field.kappa;
+    const float tau = field.absorption.medulla_extinction * field.kappa;
     if (tau > 4) {
         const Offset<float> edge = offset_inside(field.rim, float(pi / 2) - 4 / tau);
         both(angle(edge.h, edge.cos_i));
@@ -299,14 +300,14 @@ MEDULLA_FN void place_cuts(FarField<Channels>& field) noexcept {
 template <int Channels>
 MEDULLA_FN Energies<Channels, Four> energies_at(const FarField<Channels>& field, const Path<Four>& path) noexcept {
     if (field.tables == nullptr || !field.tables->absorbs)
-        return energies(path, field.incidence.absorption, field.tables != nullptr);
+        return energies(path, field.absorption, field.tables != nullptr);
     float left[4];
     for (int i = 0; i < 4; ++i) {
         TableRows rows = field.rows;
         set_offset(*field.tables, magnitude(lane(path.h_inside, i)) / field.kappa, rows);
-        left[i] = survival_of(field.incidence.absorbed, survival_length(*field.tables, rows));
+        left[i] = survival_of(field.absorbed, survival_length(*field.tables, rows));
     }
-    return energies(path, field.incidence.absorption, true, four_at(left));
+    return energies(path, field.absorption, true, four_at(left));
 }
 
 /// Means over channels of each lobe's energy, over their sum: the lobes' probabilities at four offsets.
@@ -329,7 +330,7 @@ MEDULLA_FN void visit_panel(const FarField<Channels>& field, float a, float b, G
     const float middle = 0.5f * (a + b), half = 0.5f * (b - a);
     for (int j = 0; 2 * j < rule.half; ++j) {
         const Offset<Four> at = offset_inside(field.rim, rule_nodes(rule, j, middle, half));
-        visit(at, trace(field.incidence.at, field.kappa, field.layers, at.h, at.cos_i),
+        visit(at, trace(field.inclination, field.kappa, field.layers, at.h, at.cos_i),
               rule_weights(rule, j) * Four(half * field.inverse_width) * at.dh);
     }
 }
@@ -345,9 +346,9 @@ MEDULLA_FN void visit_scattered(const FarField<Channels>& field, Visit&& visit) 
     const float per_panel = width > 0.2f ? 1.6f : (width > 0.1f ? 0.8f : 0.54f);
     const int index = (width > 0.1f ? 0 : 1) + field.quality;
     const GaussRule rule = gauss_rule(index < 0 ? 0 : index), edge = gauss_rule(0);
-    const float tau = field.incidence.absorption.medulla_extinction * field.kappa;
+    const float tau = field.absorption.medulla_extinction * field.kappa;
     // Where the medulla reaches the fibre's rim, F rises to 1 within the cos gamma_i that place_cuts grades by.
-    const Inclination<float>& at = field.incidence.at;
+    const Inclination<float>& at = field.inclination;
     const float steep = lesser(std::sqrt(at.index_excess), at.inverse_index) * lesser(1.0f, 2 * field.layers);
     const float rise = field.rim < 1 ? 4.0f : greater(2 * steep, 0.01f), dense = tau > 4 ? 4 / tau : 4.0f;
     const float edge_width = lesser(rise, dense);
@@ -392,9 +393,14 @@ MEDULLA_FN FarField<Channels> make_far(const Fibre<Channels>& fibre, const Polar
     FarField<Channels> field;
     const float from = clamp_offset(range.low), to = clamp_offset(range.high);
     const bool valid = within(from, 1.0f) && within(to, 1.0f) && from <= to;
-    field.incidence = begin_field(fibre, valid ? known : Polar{}, field);
-    if (!(field.known.cosine > 0)) return field;
+    if (!(known.cosine > 0) || !valid || fibre.status == FibreStatus::bad_parameters) return field;
     const FurParameters<Channels>& p = fibre.parameters;
+    field.known = known, field.known_theta = angle(known.sine, known.cosine);
+    field.inclination = detail::inclination(p.eta, known.cosine, p.fresnel);
+    begin_field(fibre, field.inclination, field.known_theta, field);
+    field.absorption =
+        detail::absorption(p, field.inclination.inverse_cos_t, fibre.tables != nullptr && fibre.tables->absorbs);
+    field.absorbed = p.sigma_ma * p.kappa * field.inclination.inverse_cos_t;
     field.kappa = p.kappa, field.layers = p.layers, field.g = p.g;
     field.quality = static_cast<int>(quality);
     const auto angle_of = [](float h) { return angle(h, std::sqrt((1 - h) * (1 + h))); };
@@ -408,7 +414,7 @@ MEDULLA_FN FarField<Channels> make_far(const Fibre<Channels>& fibre, const Polar
     const float width = 2 * greater(sine_cosine(0.5f * (field.gamma_low + field.gamma_high)).cosine, 1e-8f) *
                         sine_cosine(0.5f * (field.gamma_high - field.gamma_low)).sine;
     field.inverse_width = 1 / width;
-    const float rim = p.kappa / field.incidence.at.inverse_index;
+    const float rim = p.kappa / field.inclination.inverse_index;
     field.rim = rim < 1 ? rim : 1.0f;
     field.gamma_rim = angle_of(field.rim);
     if (!(field.rim > 0)) field.tables = nullptr;
@@ -423,7 +429,8 @@ inline constexpr float kept_of_average = 1 - 1e-5f;
 
 }  // namespace detail
 
-/// A hit of which an interval of offsets is seen; the whole fibre by default. @param known direction, away from the fibre
+/// A hit of which an interval of offsets is seen; the whole fibre by default. @param known direction, away from the
+/// fibre
 /// @param range clamped to [-1, 1]; where low > high, or a number is a NaN, the hit is black
 template <int Channels>
 MEDULLA_FN FarField<Channels> far_field(const Fibre<Channels>& fibre, Vector known, Offsets range = Offsets(),
@@ -474,7 +481,8 @@ MEDULLA_FN typename FarField<Channels>::Means FarField<Channels>::means(float ph
             const Four turned = Four(phi) - (scattered_centre(p + 1, path.gamma_i, path.gamma_t) + Four(float(pi)));
             y[p] = turns_of(choose(h.h < zero, -turned, turned));
         }
-        const ExitPlaces first = exit_places(y[0], Four(2 * t.phi.end)), second = exit_places(y[1], Four(2 * t.phi.end));
+        const ExitPlaces first = exit_places(y[0], Four(2 * t.phi.end)),
+                         second = exit_places(y[1], Four(2 * t.phi.end));
         for (int i = 0; i < 4; ++i) {
             set_offset(t, lane(offset, i), at);
             D[0][i] = azimuthal_density(t, at, first, i), D[1][i] = azimuthal_density(t, at, second, i);
@@ -501,8 +509,8 @@ MEDULLA_FN LobeValues<Channels> FarField<Channels>::lobes(float theta_r, float p
     result.M[5] = lane(M, 3);
     if (this->tables != nullptr) {
         const Tables& t = *this->tables;
-        const ExitPlaces place = exit_places(turns_of(Four(this->known.theta < 0 ? -theta_r : theta_r)),
-                                             Four(4 * t.theta_r.end));
+        const ExitPlaces place =
+            exit_places(turns_of(Four(known_theta < 0 ? -theta_r : theta_r)), Four(4 * t.theta_r.end));
         result.M[3] = result.M[4] = longitudinal_density(t, this->rows, place, 0, magnitude(turned) * float(1 / pi));
     }
     const Means m = means(turned);
@@ -520,8 +528,8 @@ MEDULLA_FN Evaluation<Channels> FarField<Channels>::at(float theta_r, float cosi
     float along[all_lobe_count] = {lane(M, 0), lane(M, 1), lane(M, 2), 0, 0, lane(M, 3)};
     if (this->tables != nullptr) {
         const Tables& t = *this->tables;
-        const ExitPlaces place = exit_places(turns_of(Four(this->known.theta < 0 ? -theta_r : theta_r)),
-                                             Four(4 * t.theta_r.end));
+        const ExitPlaces place =
+            exit_places(turns_of(Four(known_theta < 0 ? -theta_r : theta_r)), Four(4 * t.theta_r.end));
         along[3] = along[4] = longitudinal_density(t, this->rows, place, 0, magnitude(phi) * float(1 / pi));
     }
     for (int k = 0; k < all_lobe_count; ++k) {
@@ -532,8 +540,8 @@ MEDULLA_FN Evaluation<Channels> FarField<Channels>::at(float theta_r, float cosi
     return e;
 }
 
-/// h evenly over the range, then as the near field at h, so that the density drawn is the mean of the near field's; what
-/// is narrow keeps to the deviations within which the mean is taken.
+/// h evenly over the range, then as the near field at h, so that the density drawn is the mean of the near field's;
+/// what is narrow keeps to the deviations within which the mean is taken.
 template <int Channels>
 MEDULLA_FN Sample<Channels> FarField<Channels>::draw(RandomNumbers u) const noexcept {
     using namespace detail;
@@ -541,7 +549,7 @@ MEDULLA_FN Sample<Channels> FarField<Channels>::draw(RandomNumbers u) const noex
     if (!(this->known.cosine > 0)) return s;
     // Even in h between the ends that the quadrature has: their sines.
     const float h = clamp_offset(sine_cosine(gamma_low).sine + u.offset / inverse_width);
-    const Path<Four> four = trace(incidence.at, kappa, layers, Four(h), Four(std::sqrt((1 - h) * (1 + h))));
+    const Path<Four> four = trace(inclination, kappa, layers, Four(h), Four(std::sqrt((1 - h) * (1 + h))));
     Four all[all_lobe_count];
     shares_of(energies_at(*this, four), mask, all);
     float share[all_lobe_count];
@@ -562,11 +570,10 @@ MEDULLA_FN Sample<Channels> FarField<Channels>::draw(RandomNumbers u) const noex
     } else {
         TableRows at = this->rows;
         set_offset(*this->tables, magnitude(lane(four.h_inside, 0)) / kappa, at);
+        const LongitudeDraw along = begin_longitude(*this->tables, at, u.rows, u.longitude);
         phi = wrap_angle(scattered_centre(k - 2, gamma_i, gamma_t) + float(pi) +
-                         (h < 0 ? -1.0f : 1.0f) * draw_azimuth(*this->tables, at, u.lobe, u.azimuth));
-        const float forwardness = magnitude(phi) * float(1 / pi);
-        theta = draw_longitude(*this->tables, at, forwardness < 1 ? forwardness : 1.0f, u.rows, u.longitude);
-        theta = this->known.theta < 0 ? -theta : theta;
+                         with_sign(1.0f, h) * draw_azimuth(*this->tables, at, u.lobe, u.azimuth));
+        theta = with_sign(1.0f, known_theta) * finish_longitude(*this->tables, along, magnitude(phi) * float(1 / pi));
     }
     const Evaluation<Channels> e = this->at(theta, cosine_of(theta), phi);
     set_sample(this->known, static_cast<Lobe>(k), theta, phi, e, s);

@@ -42,16 +42,25 @@ MEDULLA_FN const char* describe(FibreStatus status) noexcept {
 /// What make_fibre does with parameters out of their ranges.
 enum class OutOfRange : std::uint32_t { black, clamp };
 
+namespace detail {
+
+/// Floats in which one number a channel stands beside one more: a multiple of four.
+template <int Channels>
+inline constexpr int channel_lanes = 4 * (Channels / 4 + 1);
+
+}  // namespace detail
+
 template <int Channels = 3>
 struct Fibre {
     FurParameters<Channels> parameters;
     FibreStatus status = FibreStatus::bad_parameters;
-    std::uint32_t out_of_range = 0;    ///< bits of Parameter
-    const Tables* tables = nullptr;    ///< null: no scattered lobes
-    alignas(16) float shift[4] = {};   ///< alpha_p of Table 2 for R, TT, TRT and the residual lobe [radians]
-    alignas(16) float deviation[4] = {};          ///< beta_p of Table 2 [radians]
-    detail::WrappedGaussians azimuthal = {};      ///< variance (p + 1) beta_n^2 (Eq. 16)
-    alignas(16) float g_weight[4] = {};           ///< of rows of g
+    std::uint32_t out_of_range = 0;           ///< bits of Parameter
+    const Tables* tables = nullptr;           ///< null: no scattered lobes
+    alignas(16) float shift[4] = {};          ///< alpha_p of Table 2 for R, TT, TRT and the residual lobe [radians]
+    alignas(16) float deviation[4] = {};      ///< beta_p of Table 2 [radians]
+    detail::WrappedGaussians azimuthal = {};  ///< variance (p + 1) beta_n^2 (Eq. 16)
+    alignas(16) float sigma_ca[detail::channel_lanes<Channels>] = {};  ///< the parameters', padded with 0
+    alignas(16) float g_weight[4] = {};                                ///< of rows of g
     std::uint32_t g_count = 0, g_first = 0;
 };
 static_assert(sizeof(Fibre<3>) <= 256, "a fibre fits into a closure");
@@ -77,7 +86,8 @@ MEDULLA_FN Fibre<Channels> make_fibre(const FurParameters<Channels>& parameters,
     // Table 2, and its rule carried on to the paths after TRT.
     detail::store_four(detail::Four(1.0f, -0.5f, -1.5f, -2.5f) * detail::Four(p.alpha), f.shift);
     detail::store_four(detail::Four(1.0f, 0.5f, 1.5f, 2.5f) * detail::Four(p.beta_m), f.deviation);
-    f.azimuthal = detail::wrapped_gaussians(p.beta_n, 1.41421356f * p.beta_n, 1.73205081f * p.beta_n);
+    for (int c = 0; c < Channels; ++c) f.sigma_ca[c] = p.sigma_ca[c];
+    f.azimuthal = detail::wrapped_gaussians(p.beta_n);
     if (!(p.kappa > 0 && p.sigma_ms > 0)) return f;
     if (tables == nullptr) {
         f.status = FibreStatus::no_tables;

@@ -53,8 +53,8 @@ inline constexpr const char* parameter_names[parameter_count] = {"eta",    "kapp
                                                                  "layers", "sigma_ms", "sigma_ma", "sigma_ca", "g"};
 /// The range of each [same unit], as text for messages.
 inline constexpr const char* parameter_ranges[parameter_count] = {
-    "(1, 10]", "[0, 1]", "[-pi/2, pi/2]", "[1e-4, 4] radians", "[1e-4, 4] radians", "[0, 1000]", "[0, 1e9]", "[0, 1e9]",
-    "[0, 1e9]", "(-1, 1)"};
+    "(1, 10]",   "[0, 1]",   "[-pi/2, pi/2]", "[1e-4, 4] radians", "[1e-4, 4] radians",
+    "[0, 1000]", "[0, 1e9]", "[0, 1e9]",      "[0, 1e9]",          "(-1, 1)"};
 
 /// A row of Table 4 as printed: degrees, one grey sigma_ca.
 struct FurPreset {

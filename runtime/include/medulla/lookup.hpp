@@ -154,7 +154,8 @@ MEDULLA_FN void normalise_clamped(const TableView& table, Contraction& contracti
 }
 
 /// Contracts the parameter axes of `table` at `query`; values outside an axis are held to its ends. signed_lobe()
-/// integrates to 1, lobe() to that and what its undershoot hold: the plain twin of contract(), four to five times as fast.
+/// integrates to 1, lobe() to that and what its undershoot hold: the plain twin of contract(), four to five times as
+/// fast.
 MEDULLA_FN Contraction contract_signed(const TableView& table, const LobeQuery& query) noexcept {
     Contraction result;
     start_contraction(table, result.weight);
@@ -183,8 +184,9 @@ MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contract
     return signed_lobe(table, contraction, exit_point(table, y));
 }
 
-/// Density per radian, >= 0, of integral 1 where `contract` made the contraction: a signed low-rank sum undershoot below 0
-/// where the lobe is nearly 0, and holding it there lowers the error (docs/accuracy.md gives how far it undershoot).
+/// Density per radian, >= 0, of integral 1 where `contract` made the contraction: a signed low-rank sum undershoot
+/// below 0 where the lobe is nearly 0, and holding it there lowers the error (docs/accuracy.md gives how far it
+/// undershoot).
 MEDULLA_FN float lobe(const TableView& table, const Contraction& contraction, float y) noexcept {
     const float value = signed_lobe(table, contraction, y);
     return value < 0 ? 0.0f : value;  // a NaN stays one

@@ -8,16 +8,17 @@
 //
 //   const Fibre<3> fibre = make_fibre(parameters, tables);        at a hit, or once: 13 numbers, textured or not
 //   const NearField<3> hit = near_field(fibre, known, h);         a ray that meets the fibre at offset h
-//   const FarField<3> hit = far_field(fibre, known);              the whole width; far_field(fibre, known, Offsets{a, b})
-//   hit.value(drawn)       energy per steradian: multiplies the light of `drawn` as it is, no cosine is left to add
+//   const FarField<3> hit = far_field(fibre, known);              the whole width; far_field(fibre, known, Offsets{a,
+//   b}) hit.value(drawn)       energy per steradian: multiplies the light of `drawn` as it is, no cosine is left to add
 //   hit.pdf(drawn)         density of sample(), per steradian
 //   hit.evaluate(drawn)    both, at the price of one
 //   hit.sample(numbers)    a direction with its value, pdf and weight = value / pdf
 //   hit.keep(lobe_bit(Lobe::R))   the same hit with some of the lobes
 //
-// Frame. `known` is the direction that the renderer has (the camera ray's in a path tracer), `drawn` the other one. Both
-// point away from the fibre, in its own frame: x along the fibre from ROOT to TIP, (y, z) across it. h = offset_of(known,
-// point) in [-1, 1] is the ray's distance from the axis in fibre radii, to the left of its direction of travel.
+// Frame. `known` is the direction that the renderer has (the camera ray's in a path tracer), `drawn` the other one.
+// Both point away from the fibre, in its own frame: x along the fibre from ROOT to TIP, (y, z) across it. h =
+// offset_of(known, point) in [-1, 1] is the ray's distance from the axis in fibre radii, to the left of its direction
+// of travel.
 //
 // Angles are the papers', whose axis runs from tip to root: theta = -asin x. Every function above takes Angles{theta,
 // phi} in place of a Vector too; hit.lobes(theta_r, phi) has M and N of each lobe, and hit.eq12(theta_r, phi) is S of

@@ -2,8 +2,9 @@
 // freely; it points to the tables alone. Rests on Yan et al. 2017, Sec. 4 and 6, with the errata of docs/bcsdf.md.
 //
 // Measure. `value` is energy per steradian about the drawn direction, for a unit that arrives along the known one: no
-// cosine is left to add. `pdf` is per steradian, the very density of what `sample` returns. A sample's `weight` is value
-// over pdf, which multiplies a path's throughput as it is; it is at most Channels, and for a grey fibre at most 1.
+// cosine is left to add. `pdf` is per steradian, the very density of what `sample` returns. A sample's `weight` is
+// value over pdf, which multiplies a path's throughput as it is; it is at most Channels, and for a grey fibre at
+// most 1.
 #pragma once
 
 #include <cmath>
@@ -34,12 +35,12 @@ struct RandomNumbers {
 
 template <int Channels = 3>
 struct Sample {
-    bool valid = false;  ///< false: the fibre has no light to give here; all numbers are 0
+    bool valid = false;   ///< false: the fibre has no light to give here; all numbers are 0
     Lobe lobe = Lobe::R;  ///< that it was drawn from
     Vector direction = {0, 0, 0};
-    Angles angles = {0, 0};  ///< the same, phi from the known azimuth
-    float pdf = 0;           ///< per steradian
-    Colour<Channels> value;  ///< energy per steradian
+    Angles angles = {0, 0};   ///< the same, phi from the known azimuth
+    float pdf = 0;            ///< per steradian
+    Colour<Channels> value;   ///< energy per steradian
     Colour<Channels> weight;  ///< value / pdf
 };
 
@@ -65,71 +66,37 @@ namespace detail {
 /// of the fibre's albedo, and it is what a float sum of energies near 1 cannot show.
 inline constexpr float negligible_energy = 5.9604645e-8f;  // 2^-24
 
+/// 1 / Channels in the lanes of a channel, from lane b on; else 0.
 template <int Channels>
-MEDULLA_HOT float mean(const float (&x)[Channels]) noexcept {
-    float sum = 0;
-    for (int c = 0; c < Channels; ++c) sum += x[c];
-    return sum * (1.0f / float(Channels));
+MEDULLA_HOT Four channel_mask(int b) noexcept {
+    constexpr float w = 1.0f / float(Channels);
+    return Four(b < Channels ? w : 0.0f, b + 1 < Channels ? w : 0.0f, b + 2 < Channels ? w : 0.0f,
+                b + 3 < Channels ? w : 0.0f);
 }
 
-/// What the known inclination decides, near and far.
-template <int Channels>
-struct Incidence {
-    Polar known;
-    Inclination<float> at = {};
-    Absorption<Channels> absorption = {};
-    float absorbed = 0;  ///< optical radius of absorption, sigma_ma kappa / cos theta_t [1]
-};
-
-/// Everything of a field but its offsets.
+/// Everything of a field but its offsets. Set where the known direction is one.
 template <int Channels>
 struct FieldBase {
-    const Tables* tables = nullptr;  ///< null: no scattered lobes
-    TruncatedGaussians longitudinal = {};
-    WrappedGaussians azimuthal = {};
-    TableRows rows = {};
-    Polar known;  ///< cosine 0: nothing is lit, every value is 0
+    Polar known;           ///< cosine 0: nothing is lit, every value is 0, and nothing else is set
+    const Tables* tables;  ///< null: no scattered lobes
+    TruncatedGaussians longitudinal;
+    WrappedGaussians azimuthal;
+    TableRows rows;
 };
 
+/// @param theta the known inclination [radians]
 template <int Channels>
-MEDULLA_HOT Incidence<Channels> begin_field(const Fibre<Channels>& fibre, const Polar& known,
-                                            FieldBase<Channels>& field) noexcept {
-    Incidence<Channels> in;
-    in.known = known;
-    if (fibre.status == FibreStatus::bad_parameters) in.known.cosine = 0;
-    field.known = in.known;
-    if (!(in.known.cosine > 0)) return in;
-    const FurParameters<Channels>& p = fibre.parameters;
-    in.at = inclination(p.eta, known.cosine, p.fresnel);
+MEDULLA_HOT void begin_field(const Fibre<Channels>& fibre, const Inclination<float>& at, float theta,
+                             FieldBase<Channels>& field) noexcept {
     field.longitudinal =
-        truncated_gaussians(aligned_four_at(fibre.shift) - Four(known.theta), aligned_four_at(fibre.deviation));
+        truncated_gaussians(aligned_four_at(fibre.shift) - Four(theta), aligned_four_at(fibre.deviation));
     field.azimuthal = fibre.azimuthal;
     field.tables = fibre.tables;
-    const bool tabled = fibre.tables != nullptr && fibre.tables->absorbs;
-    in.absorption = absorption(p, in.at.inverse_cos_t, tabled);
-    in.absorbed = p.sigma_ma * p.kappa * in.at.inverse_cos_t;
-    if (fibre.tables == nullptr) return in;
-    const Tables& t = *fibre.tables;
-    TableRows& rows = field.rows;
-    rows.g_count = fibre.g_count, rows.g_first = fibre.g_first;
-    store_four(aligned_four_at(fibre.g_weight), rows.g);
-    set_row(t.sigma, std::sqrt(p.sigma_ms * p.kappa * in.at.inverse_cos_t), rows.sigma_first, rows.sigma);
-    set_row(t.theta_i, chord_coordinate(magnitude(known.theta) * float(2 / pi)), rows.theta_first, rows.theta_i);
-    return in;
-}
-
-/// Sets the rows of h. @param offset of the ray in the medulla [medulla radii], >= 0
-MEDULLA_HOT void set_offset(const Tables& t, float offset, TableRows& rows) noexcept {
-    set_row(t.h, chord_coordinate(offset < 1 ? offset : 1.0f), rows.h_first, rows.h);
-}
-
-/// Probability of each lobe at one offset: its share of the energy, averaged over channels; 0: no light.
-template <int Channels>
-MEDULLA_HOT void set_shares(const Energies<Channels>& e, float (&share)[all_lobe_count]) noexcept {
-    float total = 0;
-    for (int k = 0; k < all_lobe_count; ++k) share[k] = mean(e.A[k]), total += share[k];
-    const float inverse = total > 1e-30f ? 1 / total : 0.0f;
-    for (float& x : share) x *= inverse;
+    if (fibre.tables == nullptr) return;
+    field.rows.g_count = fibre.g_count, field.rows.g_first = fibre.g_first;
+    store_four(aligned_four_at(fibre.g_weight), field.rows.g);
+    const FurParameters<Channels>& p = fibre.parameters;
+    set_inclination(*fibre.tables, p.sigma_ms * p.kappa * at.inverse_cos_t, theta, field.rows);
 }
 
 /// Draws a lobe by its share and makes `u` uniform again. The last lobe with a share takes what rounding leaves; -1:
@@ -175,11 +142,11 @@ MEDULLA_HOT float clamp_offset(float h) noexcept { return h < -1 ? -1.0f : (h > 
 
 template <int Channels = 3>
 struct NearField : detail::FieldBase<Channels> {
-    alignas(16) float centre[4] = {};    ///< Phi_p of R, TT, TRT [radians]
-    float scattered_centre[2] = {};      ///< Phi^s_p + pi of TTs and TRTs [radians]
-    float side = 1;                      ///< sign of h
-    float A[all_lobe_count][Channels] = {};  ///< energies
-    float share[all_lobe_count] = {};        ///< probabilities of the lobes
+    static constexpr int lanes = detail::channel_lanes<Channels>;
+    alignas(16) float centre[4];                 ///< Phi_p of R, TT, TRT [radians]
+    float scattered_centre[2], side;             ///< Phi^s_p + pi of TTs and TRTs [radians]; sign of h
+    float known_theta;                           ///< [radians]
+    alignas(16) float A[all_lobe_count][lanes];  ///< energies of the channels and, last, the lobe's probability
 
     /// Energy per steradian about `drawn`.
     MEDULLA_FN Colour<Channels> value(Vector drawn) const noexcept { return evaluate(drawn).value; }
@@ -199,16 +166,19 @@ struct NearField : detail::FieldBase<Channels> {
     /// The same hit with some lobes alone: for light groups and for one picture a lobe.
     MEDULLA_FN NearField keep(LobeMask mask) const noexcept {
         NearField kept = *this;
-        detail::Energies<Channels> e;
+        if (!(this->known.cosine > 0)) return kept;
+        float sum = 0;
+        for (int k = 0; k < all_lobe_count; ++k) sum += mask >> k & 1u ? A[k][lanes - 1] : 0.0f;
+        const float inverse = sum > 0 ? 1 / sum : 0.0f;
         for (int k = 0; k < all_lobe_count; ++k)
-            for (int c = 0; c < Channels; ++c) kept.A[k][c] = e.A[k][c] = mask >> k & 1u ? A[k][c] : 0.0f;
-        detail::set_shares(e, kept.share);
+            for (int c = 0; c < lanes; ++c)
+                kept.A[k][c] = mask >> k & 1u ? A[k][c] * (c < Channels ? 1.0f : inverse) : 0.0f;
         return kept;
     }
     /// Share of the light that leaves, over all directions.
     MEDULLA_FN Colour<Channels> albedo() const noexcept {
         Colour<Channels> sum;
-        for (int k = 0; k < all_lobe_count; ++k)
+        for (int k = 0; this->known.cosine > 0 && k < all_lobe_count; ++k)
             for (int c = 0; c < Channels; ++c) sum[c] += A[k][c];
         return sum;
     }
@@ -218,8 +188,7 @@ struct NearField : detail::FieldBase<Channels> {
     /// cos theta_i.
     MEDULLA_FN Colour<Channels> eq12(float theta_r, float phi) const noexcept {
         Colour<Channels> sum = angular_density(lobes(theta_r, phi), all_lobes ^ lobe_bit(Lobe::residual));
-        for (int c = 0; this->known.cosine > 0 && c < Channels; ++c)
-            sum[c] /= this->known.cosine * this->known.cosine;
+        for (int c = 0; this->known.cosine > 0 && c < Channels; ++c) sum[c] /= this->known.cosine * this->known.cosine;
         return sum;
     }
 
@@ -228,7 +197,15 @@ struct NearField : detail::FieldBase<Channels> {
     MEDULLA_HOT Evaluation<Channels> at(float theta_r, float cosine, float phi) const noexcept;
     MEDULLA_HOT Evaluation<Channels> at(const detail::Polar& drawn) const noexcept {
         if (!(this->known.cosine > 0 && drawn.cosine > 0)) return {};
-        return at(drawn.theta, drawn.cosine, detail::azimuth_between(this->known, drawn));
+        const Angles between = detail::angles_between(this->known, drawn);
+        return at(between.theta, drawn.cosine, between.phi);
+    }
+    MEDULLA_HOT detail::ExitPlaces places(float theta_r, float phi) const noexcept {
+        const Tables& t = *this->tables;
+        return detail::exit_places(
+            detail::turns_of(detail::Four(side * (phi - scattered_centre[0]), side * (phi - scattered_centre[1]),
+                                          known_theta < 0 ? -theta_r : theta_r, phi)),
+            detail::Four(2 * t.phi.end, 2 * t.phi.end, 4 * t.theta_r.end, 2));
     }
     MEDULLA_HOT Sample<Channels> draw(RandomNumbers u) const noexcept;
 };
@@ -244,34 +221,39 @@ MEDULLA_HOT detail::LobeDensities NearField<Channels>::densities(float theta_r, 
     d.x[5] = d.x[3], d.x[3] = d.x[4] = 0;
     if (this->tables == nullptr) return d;
     const Tables& t = *this->tables;
-    const ExitPlaces places =
-        exit_places(turns_of(Four(side * (phi - scattered_centre[0]), side * (phi - scattered_centre[1]),
-                                  this->known.theta < 0 ? -theta_r : theta_r, phi)),
-                    Four(2 * t.phi.end, 2 * t.phi.end, 4 * t.theta_r.end, 2));
-    const float M = longitudinal_density(t, this->rows, places, 2, places.place[3]);
-    d.x[3] = M * azimuthal_density(t, this->rows, places, 0);
-    d.x[4] = M * azimuthal_density(t, this->rows, places, 1);
+    const ExitPlaces exits = places(theta_r, phi);
+    const float M = longitudinal_density(t, this->rows, exits, 2, exits.place[3]);
+    d.x[3] = M * azimuthal_density(t, this->rows, exits, 0);
+    d.x[4] = M * azimuthal_density(t, this->rows, exits, 1);
     return d;
 }
 
 template <int Channels>
 MEDULLA_HOT Evaluation<Channels> NearField<Channels>::at(float theta_r, float cosine, float phi) const noexcept {
-    Evaluation<Channels> e;
-    const detail::LobeDensities d = densities(theta_r, phi);
-    const float inverse = 1 / cosine;
-    for (int k = 0; k < all_lobe_count; ++k) {
-        const float x = d.x[k] * inverse;
-        e.pdf += share[k] * x;
-        for (int c = 0; c < Channels; ++c) e.value[c] += A[k][c] * x;
+    using namespace detail;
+    const LobeDensities d = densities(theta_r, phi);
+    const Four inverse(1 / cosine);
+    alignas(16) float sum[lanes];
+    for (int b = 0; b < lanes; b += 4) {
+        const Four a = Four(d.x[0]) * aligned_four_at(A[0] + b) + Four(d.x[1]) * aligned_four_at(A[1] + b),
+                   c = Four(d.x[2]) * aligned_four_at(A[2] + b) + Four(d.x[3]) * aligned_four_at(A[3] + b),
+                   e = Four(d.x[4]) * aligned_four_at(A[4] + b) + Four(d.x[5]) * aligned_four_at(A[5] + b);
+        store_four(inverse * ((a + c) + e), sum + b);
     }
-    return e;
+    Evaluation<Channels> result;
+    for (int c = 0; c < Channels; ++c) result.value[c] = sum[c];
+    result.pdf = sum[lanes - 1];
+    return result;
 }
 
 template <int Channels>
 MEDULLA_HOT Sample<Channels> NearField<Channels>::draw(RandomNumbers u) const noexcept {
     using namespace detail;
     Sample<Channels> s;
-    const int k = this->known.cosine > 0 ? draw_lobe(share, u.lobe) : -1;
+    if (!(this->known.cosine > 0)) return s;
+    float share[all_lobe_count];
+    for (int k = 0; k < all_lobe_count; ++k) share[k] = A[k][lanes - 1];
+    const int k = draw_lobe(share, u.lobe);
     if (k < 0) return s;
     float theta, phi;
     if (k < 3) {
@@ -281,11 +263,9 @@ MEDULLA_HOT Sample<Channels> NearField<Channels>::draw(RandomNumbers u) const no
         phi = float(pi) * (2 * u.azimuth - 1);
         theta = detail::sample(this->longitudinal[3], u.longitude);
     } else {
-        phi = wrap_angle(scattered_centre[k - 3] +
-                         side * draw_azimuth(*this->tables, this->rows, u.lobe, u.azimuth));
-        const float forwardness = magnitude(phi) * float(1 / pi);
-        theta = draw_longitude(*this->tables, this->rows, forwardness < 1 ? forwardness : 1.0f, u.rows, u.longitude);
-        theta = this->known.theta < 0 ? -theta : theta;
+        const LongitudeDraw along = begin_longitude(*this->tables, this->rows, u.rows, u.longitude);
+        phi = wrap_angle(scattered_centre[k - 3] + side * draw_azimuth(*this->tables, this->rows, u.lobe, u.azimuth));
+        theta = with_sign(1.0f, known_theta) * finish_longitude(*this->tables, along, magnitude(phi) * float(1 / pi));
     }
     set_sample(this->known, static_cast<Lobe>(k), theta, phi, at(theta, cosine_of(theta), phi), s);
     return s;
@@ -296,19 +276,15 @@ MEDULLA_FN LobeValues<Channels> NearField<Channels>::lobes(float theta_r, float 
     using namespace detail;
     LobeValues<Channels> result;
     if (!(this->known.cosine > 0) || !within(theta_r, float(pi / 2)) || !within(phi, 1e4f)) return result;
-    const Four M = this->longitudinal.pdf(Four(theta_r)),
-               D = this->azimuthal.pdf(Four(phi) - aligned_four_at(centre));
+    const Four M = this->longitudinal.pdf(Four(theta_r)), D = this->azimuthal.pdf(Four(phi) - aligned_four_at(centre));
     float density[all_lobe_count] = {lane(D, 0), lane(D, 1), lane(D, 2), 0, 0, lane(D, 3)};
     for (int k = 0; k < 3; ++k) result.M[k] = lane(M, k);
     result.M[5] = lane(M, 3);
     if (this->tables != nullptr) {
         const Tables& t = *this->tables;
-        const ExitPlaces places =
-            exit_places(turns_of(Four(side * (phi - scattered_centre[0]), side * (phi - scattered_centre[1]),
-                                      this->known.theta < 0 ? -theta_r : theta_r, phi)),
-                        Four(2 * t.phi.end, 2 * t.phi.end, 4 * t.theta_r.end, 2));
-        result.M[3] = result.M[4] = longitudinal_density(t, this->rows, places, 2, places.place[3]);
-        for (int p = 0; p < 2; ++p) density[3 + p] = azimuthal_density(t, this->rows, places, p);
+        const ExitPlaces exits = places(theta_r, phi);
+        result.M[3] = result.M[4] = longitudinal_density(t, this->rows, exits, 2, exits.place[3]);
+        for (int p = 0; p < 2; ++p) density[3 + p] = azimuthal_density(t, this->rows, exits, p);
     }
     for (int k = 0; k < all_lobe_count; ++k)
         for (int c = 0; c < Channels; ++c) result.N[k][c] = A[k][c] * density[k];
@@ -317,45 +293,82 @@ MEDULLA_FN LobeValues<Channels> NearField<Channels>::lobes(float theta_r, float 
 
 namespace detail {
 
-/// Sets a near field's offset; its base was begun. @param h in [-1, 1]
+/// Sets the energies of all lobes at one offset, channels side by side, and the lobes' probabilities: their shares of
+/// the energy, averaged over channels. The formulas are those of energies() in cross_section.hpp.
 template <int Channels>
-MEDULLA_HOT void set_near(const Fibre<Channels>& fibre, const Incidence<Channels>& in, float h,
-                          NearField<Channels>& hit) noexcept {
+MEDULLA_HOT void set_energies(const Fibre<Channels>& fibre, const Path<float>& path, float inverse_cos_t,
+                              bool scattered, float survival, bool tabled, NearField<Channels>& hit) noexcept {
+    constexpr int lanes = NearField<Channels>::lanes;
     const FurParameters<Channels>& p = fibre.parameters;
-    const Path<float> path = trace(in.at, p.kappa, p.layers, h, std::sqrt((1 - h) * (1 + h)));
-    hit.side = h < 0 ? -1.0f : 1.0f;
-    for (int k = 0; k < 3; ++k) hit.centre[k] = unscattered_centre(k, path.gamma_i, path.gamma_t);
-    for (int k = 0; k < 2; ++k)
-        hit.scattered_centre[k] = scattered_centre(k + 1, path.gamma_i, path.gamma_t) + float(pi);
-    const bool inside = hit.tables != nullptr && path.s_m > 0;
-    float survival = 1;
-    if (inside) {
-        set_offset(*hit.tables, magnitude(path.h_inside) / p.kappa, hit.rows);
-        if (hit.tables->absorbs) survival = survival_of(in.absorbed, survival_length(*hit.tables, hit.rows));
+    const float F = path.cuticle.F, T = path.cuticle.T_, s_m = path.s_m * inverse_cos_t, s_c = path.s_c * inverse_cos_t;
+    const float depth = 2 * p.sigma_ms * s_m, medulla = (p.sigma_ms + p.sigma_ma) * s_m;
+    const float E = scattered ? absorbed(depth, exponential(-depth)) * survival : 0.0f;
+    const float out = (1 - p.kappa) * inverse_cos_t, inside = tabled ? 0.0f : p.kappa * p.sigma_ma * inverse_cos_t;
+    Four mean[all_lobe_count];
+    for (int b = 0; b < lanes; b += 4) {
+        const Four sigma = aligned_four_at(fibre.sigma_ca + b), cortex = Four(s_c) * sigma;
+        const Four half = cortex + Four(medulla), crossing = half + half;  // lengths of half a crossing and of a whole
+        const Four through = exponential(-crossing);
+        const Four share = exponential(-(cortex + Four(out) * sigma + Four(inside))) * Four(E);
+        const Four TT = Four(T * T) * through, again = Four(F) * through, TTs = Four(T) * share;
+        const Four stays = Four(T) + Four(F) * absorbed(crossing, through);
+        const FourMask some = stays > Four(0.0f);
+        const Four rest = only_where(some, (share + Four(T) * through) / choose(some, stays, Four(1.0f)));
+        const Four A[all_lobe_count] = {Four(F), TT, TT * again, TTs, TTs * again, Four(T) * again * again * rest};
+        const Four counts = channel_mask<Channels>(b);
+        for (int k = 0; k < all_lobe_count; ++k) {
+            store_four(A[k], hit.A[k] + b);
+            mean[k] = b == 0 ? A[k] * counts : mean[k] + A[k] * counts;
+        }
     }
-    const Energies<Channels> e = energies(path, in.absorption, inside, survival);
-    for (int k = 0; k < all_lobe_count; ++k)
-        for (int c = 0; c < Channels; ++c) hit.A[k][c] = e.A[k][c];
-    set_shares(e, hit.share);
-    bool scattered = false;
-    for (int c = 0; c < Channels; ++c) scattered = scattered || e.A[3][c] + e.A[4][c] > negligible_energy;
-    if (!scattered) hit.tables = nullptr;
+    Four last[4] = {mean[4], mean[5], Four(0.0f), Four(0.0f)};
+    transpose(mean[0], mean[1], mean[2], mean[3]), transpose(last[0], last[1], last[2], last[3]);
+    const Four low = (mean[0] + mean[1]) + (mean[2] + mean[3]), high = (last[0] + last[1]) + (last[2] + last[3]);
+    const float total = sum_of(low + high);
+    const Four inverse(total > 1e-30f ? 1 / total : 0.0f);
+    alignas(16) float share[8];
+    store_four(low * inverse, share), store_four(high * inverse, share + 4);
+    for (int k = 0; k < all_lobe_count; ++k) hit.A[k][lanes - 1] = share[k];
+    // Less than this in every channel cannot be seen beside 1.
+    if (!(lane(high, 0) + lane(low, 3) > negligible_energy)) hit.tables = nullptr;
 }
 
 template <int Channels>
 MEDULLA_HOT NearField<Channels> make_near(const Fibre<Channels>& fibre, const Polar& known, float h) noexcept {
     NearField<Channels> hit;
-    const float held = clamp_offset(h);
-    const Incidence<Channels> in = begin_field(fibre, within(held, 1.0f) ? known : Polar{}, hit);
-    if (hit.known.cosine > 0) set_near(fibre, in, held, hit);
+    h = clamp_offset(h);
+    if (!(known.cosine > 0) || !within(h, 1.0f) || fibre.status == FibreStatus::bad_parameters) return hit;
+    const FurParameters<Channels>& p = fibre.parameters;
+    hit.known = known;
+    const Inclination<float> at = inclination(p.eta, known.cosine, p.fresnel);
+    // As trace() has it, with theta_i's angle beside the two of the cross-section.
+    const float cos_h = std::sqrt((1 - h) * (1 + h)), x = std::sqrt(at.index_excess + cos_h * cos_h);
+    const float sin_t = h * at.inverse_index;
+    const Four angles = angle(Four(h, sin_t, known.sine, 0), Four(cos_h, x * at.inverse_index, known.cosine, 1));
+    const Path<float> path = path_at(at, p.kappa, p.layers, cos_h, sin_t, x, lane(angles, 0), lane(angles, 1));
+    hit.known_theta = lane(angles, 2);
+    begin_field(fibre, at, hit.known_theta, hit);
+    hit.side = h < 0 ? -1.0f : 1.0f;
+    const float turn = 2 * path.gamma_t, start = float(pi) - 2 * path.gamma_i;
+    store_four(Four(-2 * path.gamma_i, start + turn, start + 2 * turn + float(pi), 0), hit.centre);
+    hit.scattered_centre[0] = path.gamma_t - path.gamma_i + float(pi);
+    hit.scattered_centre[1] = hit.scattered_centre[0] + float(pi) + turn;
+    const bool inside = hit.tables != nullptr && path.s_m > 0, tabled = hit.tables != nullptr && hit.tables->absorbs;
+    float survival = 1;
+    if (inside) {
+        set_offset(*hit.tables, magnitude(path.h_inside) / p.kappa, hit.rows);
+        if (tabled)
+            survival = survival_of(p.sigma_ma * p.kappa * at.inverse_cos_t, survival_length(*hit.tables, hit.rows));
+    }
+    set_energies(fibre, path, at.inverse_cos_t, inside, survival, tabled, hit);
     return hit;
 }
 
 }  // namespace detail
 
-/// A hit at offset h; some 80 ns. @param known direction, away from the fibre  @param h [fibre radii], as offset_of
-/// gives it; clamped to [-1, 1], beyond which rounding may put it
-/// A direction along the fibre, or a NaN, gives a hit that is black.
+/// A hit at offset h. @param known direction, away from the fibre  @param h [fibre radii], as offset_of gives it;
+/// clamped to [-1, 1], beyond which rounding may put it A direction along the fibre, or a NaN, gives a hit that is
+/// black.
 template <int Channels>
 MEDULLA_FN NearField<Channels> near_field(const Fibre<Channels>& fibre, Vector known, float h) noexcept {
     return detail::run_fused([&] { return detail::make_near(fibre, detail::polar_of(known), h); });

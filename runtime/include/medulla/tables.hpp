@@ -1,6 +1,6 @@
-// The medulla's dense tables: a pack's factors multiplied out over ranges of g and of the optical radius, once per coat.
-// They lie in memory that the caller owns, hold offsets and no pointers, and so can be copied as bytes, to a GPU too.
-// Rests on lookup.hpp, whose contractions from factors are the reference implementation.
+// The medulla's dense tables: a pack's factors multiplied out over ranges of g and of the optical radius, once per
+// coat. They lie in memory that the caller owns, hold offsets and no pointers, and so can be copied as bytes, to a GPU
+// too. Rests on lookup.hpp, whose contractions from factors are the reference implementation.
 //
 // Each table is a tensor of cubic B-spline coefficients: C^N over (g, sigma, h; phi), C^M over (g, sigma, theta_i;
 // theta_r) for the backward and the forward side. A row is one spline over the exit direction. What a lookup returns is
@@ -45,18 +45,17 @@ MEDULLA_FN TableRanges join(const TableRanges& a, const TableRanges& b) noexcept
 
 /// Tables as they lie in memory; made by make_tables. Arrays follow the struct.
 struct Tables {
-    std::uint64_t magic;  ///< tables_magic
-    std::uint64_t bytes;  ///< of everything
-    TableRanges ranges;   ///< what they cover: as asked for, within the pack's axes
+    std::uint64_t magic;    ///< tables_magic
+    std::uint64_t bytes;    ///< of everything
+    TableRanges ranges;     ///< what they cover: as asked for, within the pack's axes
     std::uint32_t absorbs;  ///< whether survival lengths are there
     detail::SplineAxis sigma, g, h, theta_i, phi, theta_r;
-    std::uint32_t g_rows;     ///< 1: g is one number
-    std::uint32_t azimuthal;  ///< bytes from here: float[g][h][phi >= 0, phi < 0][row of |phi|][sigma]
-    std::uint32_t azimuthal_blocks;     ///< float[g][h][sigma][blocks]: cumulated integrals of eight spans each
-    std::uint32_t longitudinal;         ///< float[g][theta_i][theta_r >= 0, < 0][row of |theta_r|][back, forward][sigma]
+    std::uint32_t g_rows;            ///< 1: g is one number
+    std::uint32_t azimuthal;         ///< bytes from here: float[g][h][phi >= 0, phi < 0][row of |phi|][sigma]
+    std::uint32_t azimuthal_blocks;  ///< float[g][h][sigma][blocks]: cumulated integrals of eight spans each
+    std::uint32_t longitudinal;      ///< float[g][theta_i][theta_r >= 0, < 0][row of |theta_r|][back, forward][sigma]
     std::uint32_t longitudinal_blocks;  ///< float[g][theta_i][back, forward][sigma][blocks]
     std::uint32_t survival;             ///< float[g][h][sigma]
-    std::uint32_t unused[2];
 
     MEDULLA_HOT const float* floats(std::uint32_t offset) const noexcept {
         return reinterpret_cast<const float*>(reinterpret_cast<const char*>(this) + offset);
@@ -65,19 +64,19 @@ struct Tables {
     MEDULLA_HOT std::uint32_t azimuthal_step() const noexcept { return sigma.rows; }
     MEDULLA_HOT std::uint32_t longitudinal_step() const noexcept { return 2 * sigma.rows; }
 };
-static_assert(sizeof(Tables) == 264, "one layout everywhere");
+static_assert(sizeof(Tables) == 280, "one layout everywhere");
 inline constexpr std::uint64_t tables_magic = 0x314c42544c44454du;  // "MEDLTBL1"
 
 enum class TablesStatus {
     ok,
     no_azimuthal_table,
     no_longitudinal_table,
-    bad_ranges,     ///< a range that is empty, not finite, or wholly outside the pack's axes
-    bad_axes,       ///< the pack's two longitudinal tables have different axes, or an axis is too finely divided
+    bad_ranges,  ///< a range that is empty, not finite, or wholly outside the pack's axes
+    bad_axes,    ///< the pack's two longitudinal tables have different axes, or an axis is too finely divided
     null_memory,
     unaligned_memory,
     too_little_memory,
-    too_large,      ///< more than 2 GiB
+    too_large,  ///< more than 2 GiB
 };
 
 MEDULLA_FN const char* describe(TablesStatus status) noexcept {

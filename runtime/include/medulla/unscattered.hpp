@@ -7,8 +7,8 @@
 
 #include "medulla/config.hpp"
 #include "medulla/detail/cross_section.hpp"
-#include "medulla/fur_parameters.hpp"
 #include "medulla/detail/gaussian.hpp"
+#include "medulla/fur_parameters.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {

@@ -2,7 +2,8 @@
 //
 // Vectors. A fibre's frame has x along the fibre from ROOT to TIP, as every renderer's tangent runs, and (y, z) across
 // it. Directions point away from the fibre.
-// Angles are the papers', whose axis runs the other way: theta = -asin x is positive towards the root; phi = atan2(z, y).
+// Angles are the papers', whose axis runs the other way: theta = -asin x is positive towards the root; phi = atan2(z,
+// y).
 #pragma once
 
 #include <cmath>
@@ -45,8 +46,8 @@ MEDULLA_FN Vector direction_of(Angles a) noexcept {
     return {-std::sin(a.theta), c * std::cos(a.phi), c * std::sin(a.phi)};
 }
 
-/// Offset h of the ray along `known`: its distance from the fibre's axis, counted to the left of its direction of travel
-/// in the cross-section. @param point any point of the ray, from the axis [fibre radii]
+/// Offset h of the ray along `known`: its distance from the fibre's axis, counted to the left of its direction of
+/// travel in the cross-section. @param point any point of the ray, from the axis [fibre radii]
 MEDULLA_FN float offset_of(Vector known, Vector point) noexcept {
     // Light that comes along `known` travels in (-y, -z); its left normal is (z, -y).
     return (known.z * point.y - known.y * point.z) / std::sqrt(known.y * known.y + known.z * known.z);
@@ -68,43 +69,38 @@ namespace detail {
 /// beyond pi/2. It is the axis itself, where a fibre has no cross-section and lobes are 0.
 inline constexpr float least_cosine = 4.3e-8f;
 
-/// A direction taken apart: inclination, its cosine, and the unit vector of its azimuth.
+/// A direction taken apart: sine and cosine of its inclination, and the unit vector of its azimuth.
 struct Polar {
-    float theta = 0, cosine = 0;  ///< cosine 0: along the fibre, not finite, or no direction at all
+    float sine = 0, cosine = 0;  ///< of theta; cosine 0: along the fibre, not finite, or no direction at all
     float y = 1, z = 0;
 };
 MEDULLA_HOT Polar polar_of(Vector w) noexcept {
-    Polar p;
     const float across2 = w.y * w.y + w.z * w.z, length2 = across2 + w.x * w.x;
-    if (!within(length2, 1e30f) || !(length2 > 1e-30f)) return p;
-    const float inverse = 1 / std::sqrt(length2), across = std::sqrt(across2);
-    p.cosine = across * inverse;
-    if (!(p.cosine > least_cosine)) {
-        p.cosine = 0;
-        return p;
-    }
-    p.theta = angle(-w.x * inverse, p.cosine);
+    if (!within(length2, 1e30f) || !(length2 > 1e-30f)) return {};
+    const float inverse = 1 / std::sqrt(length2), across = std::sqrt(across2), cosine = across * inverse;
+    if (!(cosine > least_cosine)) return {};
     const float inverse_across = 1 / across;
-    p.y = w.y * inverse_across, p.z = w.z * inverse_across;
-    return p;
+    return {-w.x * inverse, cosine, w.y * inverse_across, w.z * inverse_across};
 }
 MEDULLA_FN Polar polar_of(Angles a) noexcept {
-    Polar p;
-    if (!within(a.theta, float(pi / 2)) || !within(a.phi, 1e4f)) return p;
-    p.theta = a.theta, p.cosine = std::cos(a.theta);
-    if (!(p.cosine > least_cosine)) p.cosine = 0;
-    p.y = std::cos(a.phi), p.z = std::sin(a.phi);
-    return p;
+    if (!within(a.theta, float(pi / 2)) || !within(a.phi, 1e4f)) return {};
+    const float cosine = std::cos(a.theta);
+    if (!(cosine > least_cosine)) return {};
+    return {std::sin(a.theta), cosine, std::cos(a.phi), std::sin(a.phi)};
 }
 
-/// Angle of (cosine, sine) on the whole circle [radians], in [-pi, pi].
+/// A drawn direction's inclination, and its azimuth from the known one [radians].
+MEDULLA_HOT Angles angles_between(const Polar& known, const Polar& drawn) noexcept {
+    const float cosine = known.y * drawn.y + known.z * drawn.z, sine = known.y * drawn.z - known.z * drawn.y;
+    const Four both = angle(Four(drawn.sine, sine, 0, 0), Four(drawn.cosine, magnitude(cosine), 1, 1));
+    const float turn = lane(both, 1);
+    return {lane(both, 0), cosine < 0 ? with_sign(float(pi), sine) - turn : turn};
+}
+
+/// Angle of the point (cosine, sine) of the unit circle [radians], in [-pi, pi].
 MEDULLA_HOT float full_angle(float cosine, float sine) noexcept {
     const float a = angle(sine, magnitude(cosine));
     return cosine < 0 ? with_sign(float(pi), sine) - a : a;
-}
-/// Azimuth of b from a.
-MEDULLA_HOT float azimuth_between(const Polar& a, const Polar& b) noexcept {
-    return full_angle(a.y * b.y + a.z * b.z, a.y * b.z - a.z * b.y);
 }
 
 /// Cosine of an inclination, never below least_cosine: exits at the axis itself have a density all the same.

@@ -19,7 +19,6 @@ namespace medulla {
 inline namespace MEDULLA_TARGET {
 namespace detail {
 
-
 /// Eight components side by side: AVX2 where the renderer is built for it, SSE2, which every x86-64 has, or plain
 /// floats.
 template <int bits>
@@ -349,7 +348,6 @@ MEDULLA_FN float sum_of_blend(const TableView& table, std::uint32_t k, std::uint
     for (std::uint32_t first = even; first < stride; first += rank_multiple) add(sum[1], first);
     return sum_of(plus(sum[0], times(sign, sum[1])));
 }
-
 
 }  // namespace detail
 }  // namespace MEDULLA_TARGET

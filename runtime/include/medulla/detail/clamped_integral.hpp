@@ -1,5 +1,5 @@
-// The integral of what a contracted lobe is below 0: a signed low-rank sum undershoot where the lobe is nearly 0, and holding
-// it there adds what it undershoot. Rests on blocks.hpp.
+// The integral of what a contracted lobe is below 0: a signed low-rank sum undershoot where the lobe is nearly 0, and
+// holding it there adds what it undershoot. Rests on blocks.hpp.
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,6 @@
 namespace medulla {
 inline namespace MEDULLA_TARGET {
 namespace detail {
-
 
 /// Integral of max(0, -f) over one span; f the spline with these four coefficients there. Between its ends and where it
 /// is stationary the cubic is monotone: a root is bisected, and Simpson's rule is exact.
@@ -107,7 +106,6 @@ MEDULLA_FN float undershoot(const TableView& table, const float* weight) noexcep
     });
     return sum;
 }
-
 
 }  // namespace detail
 }  // namespace MEDULLA_TARGET

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "medulla/config.hpp"
-#include "medulla/fur_parameters.hpp"
 #include "medulla/detail/elementary.hpp"
+#include "medulla/fur_parameters.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {
@@ -72,18 +72,13 @@ MEDULLA_FN Cuticle<T> cuticle(S layers, I index_excess, T cos_i, T x) noexcept {
     return {F1 * whole, T1 * whole};
 }
 
-/// @param at of all, or of each of several rays side by side
-/// @param cos_i cos gamma_i = sqrt(1 - h^2), given beside h because the caller often has it without cancellation
+/// The path, from the angles of incidence and refraction. @param x sqrt(eta'^2 - 1 + cos^2 gamma_i) = eta' cos gamma_t
 template <class T, class S, class I>
-MEDULLA_HOT Path<T> trace(const Inclination<I>& at, S kappa, S layers, T h, T cos_i) noexcept {
+MEDULLA_HOT Path<T> path_at(const Inclination<I>& at, S kappa, S layers, T cos_i, T sin_t, T x, T gamma_i,
+                            T gamma_t) noexcept {
     Path<T> path;
-    const T x = square_root(T(at.index_excess) + cos_i * cos_i), zero = T(S(0));
-    const T sin_t = h * T(at.inverse_index), cos_t = x * T(at.inverse_index);
-    path.h_inside = sin_t;
-    const T sines[2] = {h, sin_t}, cosines[2] = {cos_i, cos_t};
-    T gamma[2];
-    angles(sines, cosines, gamma);
-    path.gamma_i = gamma[0], path.gamma_t = gamma[1];
+    const T zero = T(S(0)), cos_t = x * T(at.inverse_index);
+    path.gamma_i = gamma_i, path.gamma_t = gamma_t, path.h_inside = sin_t;
     const T s2 = (T(kappa) - sin_t) * (T(kappa) + sin_t);
     const auto inside = s2 > zero;
     path.s_m = choose(inside, square_root(choose(inside, s2, T(S(1)))), zero);  // no root of 0: it has no derivative
@@ -94,6 +89,18 @@ MEDULLA_HOT Path<T> trace(const Inclination<I>& at, S kappa, S layers, T h, T co
     const T scale = T(at.fresnel_scale);
     path.cuticle = cuticle(layers, at.fresnel_index_excess, scale * cos_i, scale * x);
     return path;
+}
+
+/// @param at of all, or of each of several rays side by side
+/// @param cos_i cos gamma_i = sqrt(1 - h^2), given beside h because the caller often has it without cancellation
+template <class T, class S, class I>
+MEDULLA_HOT Path<T> trace(const Inclination<I>& at, S kappa, S layers, T h, T cos_i) noexcept {
+    const T x = square_root(T(at.index_excess) + cos_i * cos_i);
+    const T sin_t = h * T(at.inverse_index), cos_t = x * T(at.inverse_index);
+    const T sines[2] = {h, sin_t}, cosines[2] = {cos_i, cos_t};
+    T gamma[2];
+    angles(sines, cosines, gamma);
+    return path_at(at, kappa, layers, cos_i, sin_t, x, gamma[0], gamma[1]);
 }
 
 /// Phi_p = 2 p gamma_t - 2 gamma_i + p pi (Eq. 15).
@@ -136,12 +143,12 @@ MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, S>& 
     return a;
 }
 
-/// Energies A of the five lobes, Eqs. 13, 14, 20, and of the residual one. The scattered ones include E = 1 - exp(-2 s_m
-/// sigma_ms / cos theta_t), the energy of C^N, so that every lobe's azimuthal integral is its A.
+/// Energies A of the five lobes, Eqs. 13, 14, 20, and of the residual one. The scattered ones include E = 1 - exp(-2
+/// s_m sigma_ms / cos theta_t), the energy of C^N, so that every lobe's azimuthal integral is its A.
 ///
-/// Residual: of a crossing that light enters with energy e, s e leaves scattered and x e reaches the cuticle, where (1 -
-/// F) of it leaves and F starts the next. The third crossing begins with (1 - F) F^2 x^2; the sum over it and all later
-/// ones is (1 - F) F^2 x^2 (s + (1 - F) x) / (1 - F x). Without absorption s + x = 1 and all six add up to 1.
+/// Residual: of a crossing that light enters with energy e, s e leaves scattered and x e reaches the cuticle, where (1
+/// - F) of it leaves and F starts the next. The third crossing begins with (1 - F) F^2 x^2; the sum over it and all
+/// later ones is (1 - F) F^2 x^2 (s + (1 - F) x) / (1 - F x). Without absorption s + x = 1 and all six add up to 1.
 template <int Channels, class T = float>
 struct Energies {
     T A[all_lobe_count][Channels];
@@ -173,7 +180,8 @@ MEDULLA_HOT Energies<Channels, T> energies(const Path<T>& path, const Absorption
         // 1 - F x = (1 - F) + F (1 - x), which is 0 where all is reflected outside and nothing enters.
         const T stays = passed + F * absorbed(crossing[c], through);
         const auto some = stays > zero;
-        e.A[5][c] = third * through * through * choose(some, (share + passed * through) / choose(some, stays, one), zero);
+        e.A[5][c] =
+            third * through * through * choose(some, (share + passed * through) / choose(some, stays, one), zero);
     }
     return e;
 }

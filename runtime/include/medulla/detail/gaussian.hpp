@@ -12,7 +12,6 @@ namespace medulla {
 inline namespace MEDULLA_TARGET {
 namespace detail {
 
-
 /// exp(x^2) erfc(x) for x >= 0, float precision: direct up to 5, then six terms of the asymptotic series
 /// (the seventh is 7e-7 of the sum at x = 5).
 template <class T>
@@ -70,7 +69,6 @@ template <class T>
 MEDULLA_FN T normal_mass(T a, T b) noexcept {
     return normal_half_mass(b) + normal_half_mass(-a);
 }
-
 
 /// Gaussian in theta about `centre`, cut at +-pi/2 and normalised there: its integral over (-pi/2, pi/2) is 1 wherever
 /// the centre lies, so a lobe near grazing keeps its energy.
@@ -310,9 +308,13 @@ struct WrappedGaussians {
     }
 };
 
-MEDULLA_FN WrappedGaussians wrapped_gaussians(float a, float b, float c) noexcept {
-    WrappedGaussians g = {{a, b, c, 0}, {1 / a, 1 / b, 1 / c, 0}, {0, 0, 0, float(0.5 / pi)}};
-    for (int p = 0; p < 3; ++p) g.peak[p] = 0.39894228f * g.inverse[p];
+/// Deviations sqrt(p + 1) beta_n of R, TT and TRT (Eq. 16).
+MEDULLA_HOT WrappedGaussians wrapped_gaussians(float beta_n) noexcept {
+    WrappedGaussians g;
+    const Four inverse = Four(1.0f, 0.70710678f, 0.57735027f, 0.0f) * Four(1 / beta_n);
+    store_four(Four(1.0f, 1.41421356f, 1.73205081f, 0.0f) * Four(beta_n), g.deviation);
+    store_four(inverse, g.inverse);
+    store_four(Four(0.39894228f) * inverse + Four(0, 0, 0, float(0.5 / pi)), g.peak);
     return g;
 }
 

@@ -1,6 +1,6 @@
 // The one vector type: four floats with the operators of one, so that the same formula runs for one offset or for four.
-// SSE2 on x86-64, NEON on AArch64; elsewhere, on GPUs, or with MEDULLA_NO_SIMD defined, an array of four. No struct that
-// a user keeps holds one: their layout is the same everywhere.
+// SSE2 on x86-64, NEON on AArch64; elsewhere, on GPUs, or with MEDULLA_NO_SIMD defined, an array of four. No struct
+// that a user keeps holds one: their layout is the same everywhere.
 #pragma once
 
 #include <cmath>
@@ -31,7 +31,6 @@ namespace medulla {
 inline namespace MEDULLA_TARGET {
 namespace detail {
 
-
 MEDULLA_FN std::uint32_t bits_of(float x) noexcept {
     std::uint32_t bits;
     std::memcpy(&bits, &x, sizeof bits);
@@ -41,9 +40,8 @@ MEDULLA_FN std::uint32_t bits_of(float x) noexcept {
 MEDULLA_FN bool within(float x, float limit) noexcept { return (bits_of(x) & 0x7fffffffu) <= bits_of(limit); }
 /// The whole number nearest to a; what is too large to have a fraction, and a NaN, stays as it is.
 MEDULLA_FN float nearest_integer(float a) noexcept {
-    return within(a, 8388608.0f) ? float(std::int32_t(a + (a < 0 ? -0.5f : 0.5f))) : a;
+    return within(a, 8388608.0f) ? float(std::int32_t(a + std::copysign(0.5f, a))) : a;
 }
-
 
 #if defined(MEDULLA_SSE2)
 struct Four {
@@ -100,11 +98,6 @@ inline Four power_of_two(Four k) noexcept {
     return Four(_mm_castsi128_ps(_mm_slli_epi32(_mm_add_epi32(n, _mm_set1_epi32(127)), 23)));
 }
 inline bool any(FourMask mask) noexcept { return _mm_movemask_ps(mask.v) != 0; }
-/// How many lanes are set.
-inline std::uint32_t count_of(FourMask mask) noexcept {
-    const auto bits = unsigned(_mm_movemask_ps(mask.v));
-    return std::uint32_t(0x4332322132212110u >> 4 * bits & 15u);
-}
 inline Four four_at(const float* x) noexcept { return Four(_mm_loadu_ps(x)); }
 /// @param x aligned to 16 bytes
 inline Four aligned_four_at(const float* x) noexcept { return Four(_mm_load_ps(x)); }
@@ -172,7 +165,6 @@ inline Four power_of_two(Four k) noexcept {
     return Four(vreinterpretq_f32_s32(vshlq_n_s32(vaddq_s32(vcvtq_s32_f32(k.v), vdupq_n_s32(127)), 23)));
 }
 inline bool any(FourMask mask) noexcept { return vmaxvq_u32(mask.v) != 0; }
-inline std::uint32_t count_of(FourMask mask) noexcept { return vaddvq_u32(vshrq_n_u32(mask.v, 31)); }
 inline Four four_at(const float* x) noexcept { return Four(vld1q_f32(x)); }
 inline Four aligned_four_at(const float* x) noexcept { return Four(vld1q_f32(x)); }
 inline void store_four(Four a, float* x) noexcept { vst1q_f32(x, a.v); }
@@ -266,9 +258,6 @@ MEDULLA_FN Four nearest_integer(Four a) noexcept {
 MEDULLA_FN Four power_of_two(Four k) noexcept {
     return each([&](int i) { return std::ldexp(1.0f, int(k.v[i])); });
 }
-MEDULLA_FN std::uint32_t count_of(FourMask mask) noexcept {
-    return std::uint32_t(mask.v[0]) + std::uint32_t(mask.v[1]) + std::uint32_t(mask.v[2]) + std::uint32_t(mask.v[3]);
-}
 MEDULLA_FN bool any(FourMask mask) noexcept { return mask.v[0] || mask.v[1] || mask.v[2] || mask.v[3]; }
 MEDULLA_FN Four four_at(const float* x) noexcept { return Four(x[0], x[1], x[2], x[3]); }
 MEDULLA_FN Four aligned_four_at(const float* x) noexcept { return four_at(x); }
@@ -330,8 +319,8 @@ MEDULLA_FN T nearest_integer(T a) noexcept {
     using std::floor;
     return floor(a + T(0.5));
 }
-MEDULLA_FN float magnitude(float a) noexcept { return a < 0 ? -a : a; }
-MEDULLA_FN float with_sign(float x, float y) noexcept { return y < 0 ? -magnitude(x) : magnitude(x); }
+MEDULLA_HOT float magnitude(float a) noexcept { return std::fabs(a); }
+MEDULLA_HOT float with_sign(float x, float y) noexcept { return std::copysign(x, y); }
 MEDULLA_FN float power_of_two(float k) noexcept {
     const std::uint32_t bits = std::uint32_t(std::int32_t(k) + 127) << 23;
     float x;

@@ -26,7 +26,8 @@ inline constexpr std::uint32_t most_range_rows = 40;
 struct GStep {
     MEDULLA_FN double operator()(double g) const noexcept { return 0.2 * (1 - std::abs(g)); }
 };
-/// The axis of sqrt(sigma): lobes change with sigma / cos theta_r, over every scale of sigma; next to 0 they are linear.
+/// The axis of sqrt(sigma): lobes change with sigma / cos theta_r, over every scale of sigma; next to 0 they are
+/// linear.
 struct SigmaStep {
     MEDULLA_FN double operator()(double root) const noexcept { return 0.03 + 0.2 * root; }
 };
@@ -68,7 +69,8 @@ MEDULLA_FN double node_of(const AxisPlan& plan, std::uint32_t row) noexcept {
 }
 
 /// Range [low, high] within the axis that both tables share; false where they do not meet it.
-MEDULLA_FN bool clip_range(const TableView& a, const TableView& b, Quantity quantity, float& low, float& high) noexcept {
+MEDULLA_FN bool clip_range(const TableView& a, const TableView& b, Quantity quantity, float& low,
+                           float& high) noexcept {
     if (!within(low, 1e30f) || !within(high, 1e30f) || low > high) return false;
     const AxisView<float> x = axis_of(a, quantity), y = axis_of(b, quantity);
     const float lower = from_spline_coordinate(quantity, x.lower() > y.lower() ? x.lower() : y.lower()),
@@ -123,10 +125,11 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
         if (!fits(plan.axis[k])) return fail(TablesStatus::bad_axes);
         plan.stretches[k] = plan.axis[k].stretches();
         axes[k]->spans = plan.axis[k].spans, axes[k]->rows = plan.axis[k].spans + 3;
-        const std::uint32_t from = static_cast<std::uint32_t>(reinterpret_cast<const char*>(axes[k]) -
-                                                              reinterpret_cast<const char*>(&t));
+        const std::uint32_t from =
+            static_cast<std::uint32_t>(reinterpret_cast<const char*>(axes[k]) - reinterpret_cast<const char*>(&t));
         axes[k]->spans_offset = place(sizeof(SplineSpan) * plan.axis[k].spans) - from;
         axes[k]->start_offset = place(sizeof(std::uint16_t) * (plan.stretches[k] + 1)) - from;
+        axes[k]->blocks_offset = place(sizeof(SplineBlock) * axes[k]->blocks()) - from;
     }
     if (t.sigma.rows > most_range_rows || t.g.rows > most_range_rows) return fail(TablesStatus::bad_ranges);
     t.g_rows = one_g ? 1 : t.g.rows;
@@ -136,17 +139,17 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     }
     for (std::uint32_t i = 0; i < t.g_rows; ++i) plan.g[i] = one_g ? r.g_low : float(node_of(plan.axis[1], i));
     const std::uint64_t planes = std::uint64_t(t.g_rows) * t.sigma.rows;
-    const std::uint64_t floats[5] = {
-        planes * t.h.rows * 2 * t.phi.rows, planes * t.h.rows * block_count(t.phi),
-        planes * t.theta_i.rows * 4 * t.theta_r.rows, planes * t.theta_i.rows * 2 * block_count(t.theta_r),
-        plan.survival ? planes * t.h.rows : 0};
+    const std::uint64_t floats[5] = {planes * t.h.rows * 2 * t.phi.rows, planes * t.h.rows * block_count(t.phi),
+                                     planes * t.theta_i.rows * 4 * t.theta_r.rows,
+                                     planes * t.theta_i.rows * 2 * block_count(t.theta_r),
+                                     plan.survival ? planes * t.h.rows : 0};
     std::uint64_t all = at;
     for (const std::uint64_t n : floats) all += 64 + 4 * n;
     if (all > 0x7fffffffu) return fail(TablesStatus::too_large);
     std::uint32_t* const offsets[5] = {&t.azimuthal, &t.azimuthal_blocks, &t.longitudinal, &t.longitudinal_blocks,
                                        &t.survival};
     for (int k = 0; k < 5; ++k) *offsets[k] = place(4 * floats[k]);
-    t.bytes = at;
+    t.bytes = at + 16 * t.longitudinal_step();  // draws read four rows past the last
 }
 
 /// Inverse of the matrix of a spline's weights at its nodes: coefficients from values. Gauss-Jordan with pivots; the
@@ -222,7 +225,7 @@ MEDULLA_FN void expand_rows(const TableView& view, const float* weight, float* t
 /// Divides a row by the integral of its positive part and writes its cumulated integrals. A signed low-rank sum with no
 /// positive integral is no density: it becomes even.
 MEDULLA_FN void finish_row(const SplineAxis& axis, float* row, std::uint32_t stride, float* blocks) noexcept {
-    const std::uint32_t count = block_count(axis), half = half_blocks(axis);
+    const std::uint32_t count = block_count(axis), half = axis.blocks();
     const auto cumulate = [&] {
         float sum = 0;
         for (std::uint32_t b = 0; b < count; ++b) {
@@ -248,8 +251,8 @@ MEDULLA_FN void fill_tables(const TablesPlan& plan, Tables& t) noexcept {
     const auto floats = [&](std::uint32_t offset) { return const_cast<float*>(t.floats(offset)); };
     float *azimuthal = floats(t.azimuthal), *longitudinal = floats(t.longitudinal), *survival = floats(t.survival);
     const std::size_t h_step = std::size_t(2) * t.phi.rows * sigmas, g_azimuthal = t.h.rows * h_step,
-                      theta_step = std::size_t(4) * t.theta_r.rows * sigmas, g_longitudinal = t.theta_i.rows * theta_step,
-                      g_survival = std::size_t(t.h.rows) * sigmas;
+                      theta_step = std::size_t(4) * t.theta_r.rows * sigmas,
+                      g_longitudinal = t.theta_i.rows * theta_step, g_survival = std::size_t(t.h.rows) * sigmas;
     alignas(32) float weight[max_rank];
     for (std::uint32_t j = 0; j < gs; ++j) {
         for (std::uint32_t i = 0; i < sigmas; ++i) {
@@ -316,7 +319,8 @@ MEDULLA_FN TablesResult make_tables(const PackView& pack, const TableRanges& ran
         char* const from = reinterpret_cast<char*>(axes[k]);
         detail::write_axis(plan.axis[k], plan.stretches[k], *axes[k],
                            reinterpret_cast<detail::SplineSpan*>(from + axes[k]->spans_offset),
-                           reinterpret_cast<std::uint16_t*>(from + axes[k]->start_offset));
+                           reinterpret_cast<std::uint16_t*>(from + axes[k]->start_offset),
+                           reinterpret_cast<detail::SplineBlock*>(from + axes[k]->blocks_offset));
     }
     detail::fill_tables(plan, *tables);
     return {tables, TablesStatus::ok};

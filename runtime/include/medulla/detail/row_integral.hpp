@@ -25,9 +25,12 @@ struct RowCoefficients {
 /// A cubic in the distance from a span's middle.
 struct Cubic {
     float p[4];
-    MEDULLA_FN Cubic(const SplineSpan& span, const RowCoefficients& row) noexcept
-        : p{row.dot(span.weights.power[0]), row.dot(span.weights.power[1]), row.dot(span.weights.power[2]),
-            row.dot(span.weights.power[3])} {}
+    MEDULLA_HOT Cubic(const SplineSpan& span, const RowCoefficients& row) noexcept {
+        store_four(
+            (Four(row.c[0]) * aligned_four_at(span.by_row[0]) + Four(row.c[1]) * aligned_four_at(span.by_row[1])) +
+                (Four(row.c[2]) * aligned_four_at(span.by_row[2]) + Four(row.c[3]) * aligned_four_at(span.by_row[3])),
+            p);
+    }
     MEDULLA_FN float at(float x) const noexcept { return p[0] + x * (p[1] + x * (p[2] + x * p[3])); }
     /// Integral over [a, b].
     MEDULLA_FN float integral(float a, float b) const noexcept {
@@ -77,20 +80,8 @@ MEDULLA_FN float span_mass(const SplineSpan& span, const RowCoefficients& row) n
     return positive_integral(Cubic(span, row), -span.half, span.half);
 }
 
-/// The place from the span's middle [stretches] below which `mass` of a row's positive part lies, 0 <= mass <= whole,
-/// that of the span. Newton's steps from where the straight line through the cubic's ends has it: two where the cubic is
-/// a density all along, and more, kept in a bracket, where it is cut at 0.
-MEDULLA_HOT float invert_span(const SplineSpan& span, const RowCoefficients& row, float mass, float whole) noexcept {
-    const Cubic f(span, row);
-    const float half = span.half, a = f.at(-half), b = f.at(half);
-    if (a > 0 && b > 0 && row.positive()) {
-        // Along a straight line from a to b the share t of the span has (a + (b - a) t / 2) t of its mass.
-        const float share = mass / whole, t = share * (a + b) / (a + std::sqrt(a * a + share * (b - a) * (b + a)));
-        float x = half * (2 * t - 1);
-        const float from = f.integral(0, -half) + mass;
-        for (int i = 0; i < 2; ++i) x -= (f.integral(0, x) - from) / f.at(x);
-        return x;
-    }
+/// The same where the cubic is cut at 0, or steep.
+MEDULLA_FN float invert_cut_span(const Cubic& f, float half, float mass, float whole) noexcept {
     float low = -half, high = half, x = low + 2 * half * (whole > 0 ? mass / whole : 0.5f);
     for (int i = 0; i < 40 && high - low > 1e-6f * half; ++i) {
         const float error = positive_integral(f, -half, x) - mass;
@@ -104,43 +95,87 @@ MEDULLA_HOT float invert_span(const SplineSpan& span, const RowCoefficients& row
     return x;
 }
 
-/// Spans of a block of cumulated integrals: a draw finds its block among these, and its span within.
-inline constexpr std::uint32_t block_spans = 4;
-/// Blocks of an exit axis: of y >= 0, then of y < 0; padded to a multiple of four by blocks of no mass.
-MEDULLA_HOT std::uint32_t half_blocks(const SplineAxis& axis) noexcept {
-    return (axis.spans + block_spans - 1) / block_spans;
-}
-MEDULLA_HOT std::uint32_t block_count(const SplineAxis& axis) noexcept { return (2 * half_blocks(axis) + 3) / 4 * 4; }
-
-/// Draws an exit from the positive part of one row: exactly, by inverting its integral.
-/// @param row its first coefficient; from |y| to |y| they are `stride` floats apart
-/// @param blocks cumulated integrals, the last is 1  @param u in [0, 1]
-MEDULLA_HOT float draw_from_row(const SplineAxis& axis, const float* row, std::uint32_t stride, const float* blocks,
-                                float u) noexcept {
-    u = u < 0.99999994f ? u : 0.99999994f;
-    const std::uint32_t count = block_count(axis), half = half_blocks(axis);
-    std::uint32_t block = 0;
-    for (std::uint32_t b = 0; b < count; b += 4) block += count_of(Four(u) < four_at(blocks + b));
-    block = count - block;  // the first whose cumulated integral is above u
-    const bool below = block >= half;
-    const std::uint32_t first = (below ? block - half : block) * block_spans;
-    if (below) row += std::size_t(axis.rows) * stride;
-    row += std::size_t(first) * stride;
-    float rest = (u - (block > 0 ? blocks[block - 1] : 0.0f)) * axis.scale, mass = 0;
-    const std::uint32_t most = axis.spans - first < block_spans ? axis.spans - first : block_spans;
-    std::uint32_t span = 0;
-    for (std::uint32_t s = 0; s < most; ++s) {
-        const float here = span_mass(axis.span(first + s), RowCoefficients(row + std::size_t(s) * stride, stride));
-        if (!(here > 0)) continue;
-        rest -= mass;  // past the span before
-        span = s, mass = here;
-        if (rest < here) break;
+/// The place from the span's middle [stretches] below which `mass` of a row's positive part lies, 0 <= mass <= whole,
+/// that of the span. Where the cubic is a density all along: one step of third order (Chebyshev's) from where the
+/// straight line between the cubic's ends has it; else Newton's steps, kept in a bracket.
+MEDULLA_HOT float invert_span(const SplineSpan& span, const RowCoefficients& row, float mass, float whole) noexcept {
+    const Cubic f(span, row);
+    const float half = span.half, a = f.at(-half), b = f.at(half);
+    if (row.positive() && a > 0.25f * b && b > 0.25f * a) {
+        // Along a straight line from a to b the share t of the span has (a + (b - a) t / 2) t of its mass; this is its
+        // inverse to second order in (b - a) / (b + a).
+        const float share = mass / whole, tilt = (a - b) / (a + b), t = share + tilt * share * (share - 1);
+        const float x = half * (2 * t - 1), inverse = 1 / f.at(x);
+        const float step = (f.integral(-half, x) - mass) * inverse;
+        const float slope = f.p[1] + x * (2 * f.p[2] + 3 * x * f.p[3]);
+        const float to = x - step * (1 + 0.5f * step * slope * inverse);
+        return to > -half ? (to < half ? to : half) : -half;
     }
-    const SplineSpan& at = axis.span(first + span);
-    rest = rest > 0 ? (rest < mass ? rest : mass) : 0.0f;
-    float place = at.middle + invert_span(at, RowCoefficients(row + std::size_t(span) * stride, stride), rest, mass);
-    place = place > 0 ? (place < axis.end ? place : axis.end) : 0.0f;
-    return below ? -place / axis.scale : place / axis.scale;
+    return invert_cut_span(f, half, mass, whole);
+}
+
+/// Cumulated integrals of a row: of the blocks of y >= 0, then of y < 0, padded with 1 to a multiple of four.
+MEDULLA_HOT std::uint32_t block_count(const SplineAxis& axis) noexcept { return (2 * axis.blocks() + 3) / 4 * 4; }
+
+/// Which of four ascending intervals `rest` lies in, by their masses, and what it is within: one with a mass.
+struct SpanDraw {
+    std::uint32_t span;
+    float mass, rest;
+};
+MEDULLA_HOT SpanDraw draw_span(const float (&mass)[4], float rest) noexcept {
+    const float first = mass[0], second = first + mass[1], third = second + mass[2];
+    const float below[4] = {0, first, second, third};
+    std::uint32_t span = std::uint32_t(rest >= first) + std::uint32_t(rest >= second) + std::uint32_t(rest >= third);
+    while (span > 0 && !(mass[span] > 0)) --span;  // past the sum, by its rounding
+    rest -= below[span];
+    return {span, mass[span], greater(0.0f, lesser(rest, mass[span]))};
+}
+
+/// The block of a row in which a number u lies, and how far within.
+struct BlockDraw {
+    std::uint32_t block;
+    float rest;  ///< of u beyond the blocks before it
+};
+/// @param cumulated integrals of the row's blocks, the last is 1  @param u in [0, 1)
+MEDULLA_HOT BlockDraw draw_block(const SplineAxis& axis, const float* cumulated, float u) noexcept {
+    const std::uint32_t count = block_count(axis);
+    Four above;  // how many are above u, a float a lane
+    for (std::uint32_t b = 0; b < count; b += 4)
+        above = above + only_where(Four(u) < four_at(cumulated + b), Four(1.0f));
+    const std::uint32_t block = count - std::uint32_t(std::int32_t(sum_of(above)));
+    return {block, u - (block > 0 ? cumulated[block - 1] : 0.0f)};
+}
+/// A random number of [0, 1] kept below 1.
+MEDULLA_HOT float below_1(float u) noexcept { return lesser(u, 0.99999994f); }
+
+/// Draws an exit from the positive part of one row, within a block: exactly, by inverting its integral.
+/// @param row its first coefficient; from |y| to |y| they are `stride` floats apart
+MEDULLA_HOT float draw_in_block(const SplineAxis& axis, const float* row, std::uint32_t stride,
+                                BlockDraw block) noexcept {
+    const std::uint32_t half = axis.blocks(), below = std::uint32_t(block.block >= half);
+    const std::uint32_t first = block.block - below * half;
+    row += (below * axis.rows + first * block_spans) * stride;
+    const float rest = block.rest * axis.scale;
+    // Rows past the axis are read, from what lies behind, and count for nothing: their integrals are 0.
+    const float* const r3 = row + 3 * std::size_t(stride);
+    float mass[4] = {},
+          c[7] = {row[0], row[stride], row[2 * stride], r3[0], r3[stride], r3[2 * stride], r3[3 * stride]};
+    const Four c0(c[0], c[1], c[2], c[3]), c1(c[1], c[2], c[3], c[4]), c2(c[2], c[3], c[4], c[5]),
+        c3(c[3], c[4], c[5], c[6]);
+    if (!any(lesser(c0, c3) < Four(0.0f))) {
+        const SplineBlock& at = axis.block(first);
+        store_four((c0 * aligned_four_at(at.integral[0]) + c1 * aligned_four_at(at.integral[1])) +
+                       (c2 * aligned_four_at(at.integral[2]) + c3 * aligned_four_at(at.integral[3])),
+                   mass);
+    } else {
+        const std::uint32_t spans = axis.spans - first * block_spans;
+        for (std::uint32_t s = 0; s < 4 && s < spans; ++s)
+            mass[s] = span_mass(axis.span(first * block_spans + s), RowCoefficients(c + s, 1));
+    }
+    const SpanDraw drawn = draw_span(mass, rest);
+    const SplineSpan& at = axis.span(first * block_spans + drawn.span);
+    const float place = at.middle + invert_span(at, RowCoefficients(c + drawn.span, 1), drawn.rest, drawn.mass);
+    return with_sign(greater(0.0f, lesser(place, axis.end)) * axis.inverse_scale, 0.5f - float(below));
 }
 
 }  // namespace detail

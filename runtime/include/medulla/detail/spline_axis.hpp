@@ -32,23 +32,35 @@ struct CubicWeights {
 /// A span: its weights, and what drawing from it needs.
 struct SplineSpan {
     CubicWeights weights;
-    alignas(16) float integral[4];  ///< of each row's weight over the span [stretches]
-    float middle, half;             ///< of the span [stretches]
+    alignas(16) float by_row[4][4];  ///< the same weights, [row][power]
+    alignas(16) float integral[4];   ///< of each row's weight over the span [stretches]
+    float middle, half;              ///< of the span [stretches]
     float unused[2];
 };
-static_assert(sizeof(SplineSpan) == 96, "one layout everywhere");
+static_assert(sizeof(SplineSpan) == 160, "one layout everywhere");
+
+/// Integrals of four neighbouring spans' row weights, for masses of all four at once.
+struct SplineBlock {
+    alignas(16) float integral[4][4];  ///< [row less the span][span]; 0 beyond the axis
+};
+inline constexpr std::uint32_t block_spans = 4;
 
 /// Even stretches say which span a coordinate lies in. Where a breakpoint is not the end of a stretch, the nearest end
 /// stands in for it; there the cubics of two neighbours differ by the cube of the distance, at most a 32nd of a span.
 struct SplineAxis {
-    float lower, scale, end;     ///< coordinate of the lower end; stretches per unit; number of stretches
-    std::uint32_t spans, rows;   ///< rows = spans + 3
-    std::uint32_t spans_offset;  ///< SplineSpan[spans], bytes from this axis
-    std::uint32_t start_offset;  ///< std::uint16_t[stretches + 1]: the span at the middle of a stretch
-    std::uint32_t unused;
+    float lower, scale, end;      ///< coordinate of the lower end; stretches per unit; number of stretches
+    float inverse_scale;          ///< 1 / scale
+    std::uint32_t spans, rows;    ///< rows = spans + 3
+    std::uint32_t spans_offset;   ///< SplineSpan[spans], bytes from this axis
+    std::uint32_t start_offset;   ///< std::uint16_t[stretches + 1]: the span at the middle of a stretch
+    std::uint32_t blocks_offset;  ///< SplineBlock[blocks]
 
     MEDULLA_HOT const SplineSpan& span(std::uint32_t i) const noexcept {
         return reinterpret_cast<const SplineSpan*>(reinterpret_cast<const char*>(this) + spans_offset)[i];
+    }
+    MEDULLA_HOT std::uint32_t blocks() const noexcept { return (spans + block_spans - 1) / block_spans; }
+    MEDULLA_HOT const SplineBlock& block(std::uint32_t i) const noexcept {
+        return reinterpret_cast<const SplineBlock*>(reinterpret_cast<const char*>(this) + blocks_offset)[i];
     }
     MEDULLA_HOT std::uint32_t start(std::uint32_t stretch) const noexcept {
         return reinterpret_cast<const std::uint16_t*>(reinterpret_cast<const char*>(this) + start_offset)[stretch];
@@ -66,7 +78,7 @@ struct SplineAxis {
         return at_place(v > 0 ? std::uint32_t(std::int32_t(v)) : 0u, v);
     }
 };
-static_assert(sizeof(SplineAxis) == 32, "one layout everywhere");
+static_assert(sizeof(SplineAxis) == 36, "one layout everywhere");
 
 /// Spans at most: a stretch's span is a std::uint16_t, and tables stay within 4 GiB.
 inline constexpr std::uint32_t most_table_spans = 1024;
@@ -121,7 +133,8 @@ MEDULLA_FN void plan_range(double lower, double upper, Step&& step, AxisPlan& pl
     double x = lower;
     std::uint32_t n = 0;
     for (; x < upper && n < most_table_spans; ++n) plan.t[n + 2] = x, x += step(x);
-    for (std::uint32_t i = 1; i < n; ++i) plan.t[i + 2] = lower + (plan.t[i + 2] - lower) * (upper - lower) / (x - lower);
+    for (std::uint32_t i = 1; i < n; ++i)
+        plan.t[i + 2] = lower + (plan.t[i + 2] - lower) * (upper - lower) / (x - lower);
     plan.spans = n;
     plan.t[0] = plan.t[1] = lower;
     plan.t[n + 2] = plan.t[n + 3] = plan.t[n + 4] = upper;
@@ -136,12 +149,13 @@ MEDULLA_FN bool fits(const AxisPlan& plan) noexcept {
     return true;
 }
 
-/// Writes an axis. @param spans, start where its arrays lie, at the offsets that the axis has
+/// Writes an axis into memory that is 0. @param spans, start, blocks where its arrays lie, at the offsets it has
 MEDULLA_FN void write_axis(const AxisPlan& plan, std::uint32_t stretches, SplineAxis& axis, SplineSpan* spans,
-                           std::uint16_t* start) noexcept {
+                           std::uint16_t* start, SplineBlock* blocks) noexcept {
     const double lower = plan.lower(), scale = double(stretches) / (plan.upper() - lower);
     axis.lower = float(lower), axis.scale = float(scale), axis.end = float(stretches);
-    axis.spans = plan.spans, axis.rows = plan.spans + 3, axis.unused = 0;
+    axis.inverse_scale = float(1 / scale);
+    axis.spans = plan.spans, axis.rows = plan.spans + 3;
     std::uint32_t from = 0;
     for (std::uint32_t i = 0; i < plan.spans; ++i) {
         const double a = plan.knot(std::int32_t(i)), b = plan.knot(std::int32_t(i) + 1);
@@ -168,6 +182,10 @@ MEDULLA_FN void write_axis(const AxisPlan& plan, std::uint32_t stretches, Spline
         for (int r = 0; r < 4; ++r)
             s.integral[r] = float(span_length * (double(s.weights.power[0][r]) +
                                                  span_length * span_length / 12 * double(s.weights.power[2][r])));
+        for (int r = 0; r < 4; ++r) {
+            for (int k = 0; k < 4; ++k) s.by_row[r][k] = s.weights.power[k][r];
+            blocks[i / block_spans].integral[r][i % block_spans] = s.integral[r];
+        }
         for (const double next = (b - lower) * scale; from < stretches && double(from) + 0.5 < next; ++from)
             start[from] = static_cast<std::uint16_t>(i);
     }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/gauss_legendre.hpp"
@@ -62,7 +63,7 @@ struct FarField : detail::FieldBase<Channels> {
     float inverse_width = 0;              ///< 1 / (sin gamma_high - sin gamma_low)
     float rim = 1;                        ///< offset of the medulla's rim, min(1, kappa eta') [fibre radii]
     float gamma_rim = 0;                  ///< asin rim [radians]
-    float residual[Channels] = {}, residual_share = 0;  ///< mean energy and probability of the residual lobe
+    float residual[std::size_t(Channels)] = {}, residual_share = 0;  ///< mean energy and probability of the residual lobe
     detail::LobeCuts cuts[3];                           ///< of R, TT, TRT
 
     /// As NearField has them, averaged over the range.
@@ -88,7 +89,7 @@ struct FarField : detail::FieldBase<Channels> {
     }
     /// The parts of a mean: for each lobe its N, and its share of the probability density over phi.
     struct Means {
-        float N[all_lobe_count][Channels] = {}, share[all_lobe_count] = {};
+        float N[all_lobe_count][std::size_t(Channels)] = {}, share[all_lobe_count] = {};
     };
     MEDULLA_FN Means means(float phi) const noexcept;
 
@@ -166,7 +167,7 @@ MEDULLA_FN float invert_exit(int p, float inverse_index, float index_excess, flo
         const float error = at.phi - phi;
         if (std::abs(error) < tolerance) break;
         ((error > 0) == rising ? high : low) = x;
-        x = at.slope != 0 ? x - error / at.slope : 0.5f * (low + high);
+        x = at.slope < 0 || at.slope > 0 ? x - error / at.slope : 0.5f * (low + high);
     }
     return x;
 }
@@ -246,8 +247,8 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float 
                     gb = invert_exit(p, at.inverse_index, at.index_excess, leave, a, at_a, b, at_b, 0.02f * s);
                 ga = ga > a ? ga : a, gb = gb < b ? gb : b;
                 if (!(gb > ga)) continue;
-                const float sa = ga == a ? at_a.slope : exit_of(p, at.inverse_index, at.index_excess, ga).slope;
-                const float sb = gb == b ? at_b.slope : exit_of(p, at.inverse_index, at.index_excess, gb).slope;
+                const float sa = !(ga > a) ? at_a.slope : exit_of(p, at.inverse_index, at.index_excess, ga).slope;
+                const float sb = !(gb < b) ? at_b.slope : exit_of(p, at.inverse_index, at.index_excess, gb).slope;
                 const float steepest = ga < 0 && gb > 0 && p == 2 ? slope : greater(std::abs(sa), std::abs(sb));
                 // The image that is y alone: the others' tails are not within this reach of theirs.
                 integrate_piece(field, p, ga, gb, steepest / s, [&](const Path<Four>& path, Four weight) {
@@ -373,7 +374,7 @@ MEDULLA_FN void visit_scattered(const FarField<Channels>& field, Visit&& visit) 
 /// Mean energy and probability of the residual lobe, which is even in phi: once a field.
 template <int Channels>
 MEDULLA_FN void average_residual(FarField<Channels>& field) noexcept {
-    Four energy[Channels], probability;
+    Four energy[std::size_t(Channels)], probability;
     const LobeCuts& cuts = field.cuts[1];
     for (int i = 1; i < cuts.count; ++i)
         integrate_piece(field, 1, cuts.gamma[i - 1], cuts.gamma[i], 0.0f, [&](const Path<Four>& path, Four weight) {
@@ -450,7 +451,7 @@ MEDULLA_FN typename FarField<Channels>::Means FarField<Channels>::means(float ph
     Means m;
     for (int p = 0; p < 3; ++p) {
         if (!(mask >> p & 1u)) continue;
-        Four N[Channels], probability;
+        Four N[std::size_t(Channels)], probability;
         visit_unscattered(*this, p, phi, [&](const Path<Four>& path, Four weight, Four D) {
             const Energies<Channels, Four> e = energies_at(*this, path);
             Four share[all_lobe_count];

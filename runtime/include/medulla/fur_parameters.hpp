@@ -2,6 +2,8 @@
 // Rests on Yan et al. 2017, Tables 1 and 4; lengths are in fibre radii, angles in radians.
 #pragma once
 
+#include <cstddef>
+
 #include <cstdint>
 
 #include "medulla/config.hpp"
@@ -29,7 +31,7 @@ struct FurParameters {
     T layers = T(1);            ///< layers of the cuticle [1], in [0, 1000], need not be whole
     T sigma_ms = T(0);          ///< scattering coefficient of the medulla [1 / fibre radius], in [0, 1e9]
     T sigma_ma = T(0);          ///< absorption coefficient of the medulla [1 / fibre radius], in [0, 1e9]
-    T sigma_ca[Channels] = {};  ///< absorption coefficient of the cortex [1 / fibre radius], in [0, 1e9]
+    T sigma_ca[std::size_t(Channels)] = {};  ///< absorption coefficient of the cortex [1 / fibre radius], in [0, 1e9]
     T g = T(0);                 ///< mean cosine of the medulla's phase function [1], in (-1, 1)
     Fresnel fresnel = Fresnel::bravais;
 };
@@ -105,7 +107,7 @@ namespace detail {
 
 /// x within [low, high], 0 <= low: compared as bits, so that a NaN is out of range under -ffast-math too.
 MEDULLA_HOT bool within(float x, float low, float high) noexcept {
-    return bits_of(x) - bits_of(low) <= bits_of(high) - bits_of(low) || (low == 0 && bits_of(x) == 0x80000000u);
+    return bits_of(x) - bits_of(low) <= bits_of(high) - bits_of(low) || (bits_of(low) == 0 && bits_of(x) == 0x80000000u);
 }
 inline constexpr float greatest_below_1 = 0.99999994f, least_above_1 = 1.0000001f;
 

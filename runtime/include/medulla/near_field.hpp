@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "medulla/config.hpp"
@@ -48,7 +49,7 @@ struct Sample {
 template <int Channels = 3>
 struct LobeValues {
     float M[all_lobe_count] = {};            ///< longitudinal density [1 / radian]
-    float N[all_lobe_count][Channels] = {};  ///< azimuthal density times energy [1 / radian]
+    float N[all_lobe_count][std::size_t(Channels)] = {};  ///< azimuthal density times energy [1 / radian]
 };
 
 /// sum M N over the lobes of a mask: energy per radian^2 of (theta_r, phi).
@@ -146,7 +147,7 @@ struct NearField : detail::FieldBase<Channels> {
     alignas(16) float centre[4];                 ///< Phi_p of R, TT, TRT [radians]
     float scattered_centre[2], side;             ///< Phi^s_p + pi of TTs and TRTs [radians]; sign of h
     float known_theta;                           ///< [radians]
-    alignas(16) float A[all_lobe_count][lanes];  ///< energies of the channels and, last, the lobe's probability
+    alignas(16) float A[all_lobe_count][std::size_t(lanes)];  ///< energies of the channels and, last, the lobe's probability
 
     /// Energy per steradian about `drawn`.
     MEDULLA_FN Colour<Channels> value(Vector drawn) const noexcept { return evaluate(drawn).value; }
@@ -233,7 +234,7 @@ MEDULLA_HOT Evaluation<Channels> NearField<Channels>::at(float theta_r, float co
     using namespace detail;
     const LobeDensities d = densities(theta_r, phi);
     const Four inverse(1 / cosine);
-    alignas(16) float sum[lanes];
+    alignas(16) float sum[std::size_t(lanes)];
     for (int b = 0; b < lanes; b += 4) {
         const Four a = Four(d.x[0]) * aligned_four_at(A[0] + b) + Four(d.x[1]) * aligned_four_at(A[1] + b),
                    c = Four(d.x[2]) * aligned_four_at(A[2] + b) + Four(d.x[3]) * aligned_four_at(A[3] + b),

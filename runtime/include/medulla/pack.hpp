@@ -301,7 +301,7 @@ MEDULLA_FN PackStatus check_knots(const AxisView<float>& axis) noexcept {
 MEDULLA_FN bool half_circle(const AxisView<float>& axis, Quantity quantity) noexcept {
     if (quantity != Quantity::phi && quantity != Quantity::theta_r) return true;
     const float end = quantity == Quantity::phi ? float(pi) : float(pi / 2);
-    return axis.lower() == 0 && std::abs(axis.upper() - end) < 1e-6f * end;
+    return !(axis.lower() < 0 || axis.lower() > 0) && std::abs(axis.upper() - end) < 1e-6f * end;
 }
 
 MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) noexcept {

@@ -181,7 +181,6 @@ struct SplineSolve {
             for (std::uint32_t k = 0; k < rows; ++k) a[c][k] *= factor, inverse[c][k] *= factor;
             for (std::uint32_t i = 0; i < rows; ++i) {
                 const double by = i == c ? 0 : a[i][c];
-                if (by == 0) continue;
                 for (std::uint32_t k = 0; k < rows; ++k) a[i][k] -= by * a[c][k], inverse[i][k] -= by * inverse[c][k];
             }
         }

@@ -132,9 +132,9 @@ int from_environment(const char* name, int otherwise) {
 template <int Channels>
 float greatest_weight(const NearField<Channels>& near) {
     float greatest = 0;
-    for (int k = 0; k < all_lobe_count; ++k)
-        for (int c = 0; c < Channels && near.share[k] > 0; ++c)
-            greatest = std::max(greatest, near.A[k][c] / near.share[k]);
+    for (const auto& A : near.A)
+        for (int c = 0; c < Channels && A[near.lanes - 1] > 0; ++c)
+            greatest = std::max(greatest, A[c] / A[near.lanes - 1]);
     return greatest;
 }
 
@@ -153,19 +153,20 @@ TEST_CASE("near samples pass chi-squared with Sidak's correction, a broken pdf f
         const NearField<3> near =
             near_field(fibre, Angles{i % 8 == 7 ? 1.52f : 2.8f * (r.uniform() - 0.5f), 0}, 2 * r.uniform() - 1);
         const Drawn d = draw(near, r, samples);
-        const auto share = expected_shares([&](float t, float f) { return near.pdf(Angles{t, f}); }, 4);
+        const auto expected = expected_shares([&](float t, float f) { return near.pdf(Angles{t, f}); }, 4);
         double whole = 0;
-        for (double x : share) whole += x;
+        for (double x : expected) whole += x;
         CHECK(whole == Approx(1).epsilon(2e-4));  // Gauss nodes against kinks at the tables' knots
-        const double value = chi_squared(share, d.counts, samples);
+        const double value = chi_squared(expected, d.counts, samples);
         if (value > level)
             ++passed;
         else
             std::printf("near case %d: p-value %.2g\n", i, value);
         // Broken: lobe R is said to be half as likely as it is drawn (its share goes to the others).
         NearField<3> broken = near;
-        const float moved = 0.5f * broken.share[0];
-        broken.share[0] -= moved, broken.share[near.share[3] > 0 ? 3 : 1] += moved;
+        constexpr int share = NearField<3>::lanes - 1;
+        const float moved = 0.5f * broken.A[0][share];
+        broken.A[0][share] -= moved, broken.A[near.A[3][share] > 0 ? 3 : 1][share] += moved;
         const auto wrong = expected_shares([&](float t, float f) { return broken.pdf(Angles{t, f}); }, 3);
         if (!(chi_squared(wrong, d.counts, samples) > level)) ++broken_caught;
         CHECK(d.largest_weight <= greatest_weight(near) * 1.00001f);
@@ -308,7 +309,7 @@ TEST_CASE("every random number in [0, 1], both ends included, gives a direction"
             u.offset = ends[(k + k / 5) % 5];
             check(near, "near", u);
             for (int lobe = 0; lobe < all_lobe_count; ++lobe)
-                if (one[lobe].share[lobe] > 0) check(one[lobe], lobe_names[lobe], u);
+                if (one[lobe].A[lobe][NearField<3>::lanes - 1] > 0) check(one[lobe], lobe_names[lobe], u);
             if (k % 5 == i % 5 || i == 0) check(far, "far", u);
         }
         for (int k = 0; k < 5; ++k) {

@@ -17,12 +17,13 @@ static void print(const Evaluation<Channels>& e) {
 }
 template <int Channels>
 static void print(const Sample<Channels>& s) {
-    print(s.direction.x), print(s.direction.y), print(s.direction.z), print(s.pdf), print(s.weight[0]);
+    for (const float x : {s.direction.x, s.direction.y, s.direction.z, s.pdf, s.weight[0]}) print(x);
 }
 
 int main() {
     const PackView pack = default_pack();
-    print(azimuthal(pack, 2.0f, 0.4f, 0.5f, 0.52f)), print(longitudinal(pack, Side::back, 2.0f, 0.4f, 0.5f, -0.3f));
+    print(azimuthal(pack, 2.0f, 0.4f, 0.5f, 0.52f));
+    print(longitudinal(pack, Side::back, 2.0f, 0.4f, 0.5f, -0.3f));
     for (const FurPreset& preset : fur_presets) {
         const FurParameters<2> parameters = parameters_of<2>(preset);
         const TablesResult made = make_tables(pack, ranges_of(parameters), memory, sizeof memory);
@@ -35,8 +36,10 @@ int main() {
             const FarField<2> whole = far_field(fibre, known);
             for (const float phi : {0.5f, -2.8f}) {
                 const Vector drawn = direction_of(Angles{0.1f - theta, 0.7f + phi});
-                print(hit.evaluate(drawn)), print(whole.evaluate(drawn));
-                print(hit.eq12(0.1f - theta, phi)[0]), print(whole.eq12(0.1f - theta, phi)[1]);
+                print(hit.evaluate(drawn));
+                print(whole.evaluate(drawn));
+                print(hit.eq12(0.1f - theta, phi)[0]);
+                print(whole.eq12(0.1f - theta, phi)[1]);
             }
             const float nan = std::numeric_limits<float>::quiet_NaN();
             const Angles from[5] = {{theta, 0}, {-theta, 1}, {1.57f, 2}, {nan, 3}, {1.5f, -1}},
@@ -47,7 +50,8 @@ int main() {
             for (const Evaluation<2>& e : many) print(e);
             for (const float lobe : {0.01f, 0.3f, 0.6f, 0.97f}) {
                 const RandomNumbers u = {lobe, 0.3f, 0.7f, 0.2f, 0.5f};
-                print(hit.sample(u)), print(whole.sample(u));
+                print(hit.sample(u));
+                print(whole.sample(u));
             }
             print(hit.keep(lobe_bit(Lobe::TTs)).value(direction_of(Angles{0.1f, 2.0f}))[0]);
         }

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/gauss_legendre.hpp"
@@ -62,8 +63,9 @@ struct FarField : detail::FieldBase<Channels> {
     float inverse_width = 0;              ///< 1 / (sin gamma_high - sin gamma_low)
     float rim = 1;                        ///< offset of the medulla's rim, min(1, kappa eta') [fibre radii]
     float gamma_rim = 0;                  ///< asin rim [radians]
-    float residual[Channels] = {}, residual_share = 0;  ///< mean energy and probability of the residual lobe
-    detail::LobeCuts cuts[3];                           ///< of R, TT, TRT
+    float residual[std::size_t(Channels)] = {},
+          residual_share = 0;  ///< mean energy and probability of the residual lobe
+    detail::LobeCuts cuts[3];  ///< of R, TT, TRT
 
     /// As NearField has them, averaged over the range.
     MEDULLA_FN Colour<Channels> value(Vector drawn) const noexcept { return evaluate(drawn).value; }
@@ -88,7 +90,7 @@ struct FarField : detail::FieldBase<Channels> {
     }
     /// The parts of a mean: for each lobe its N, and its share of the probability density over phi.
     struct Means {
-        float N[all_lobe_count][Channels] = {}, share[all_lobe_count] = {};
+        float N[all_lobe_count][std::size_t(Channels)] = {}, share[all_lobe_count] = {};
     };
     MEDULLA_FN Means means(float phi) const noexcept;
 
@@ -166,7 +168,7 @@ MEDULLA_FN float invert_exit(int p, float inverse_index, float index_excess, flo
         const float error = at.phi - phi;
         if (std::abs(error) < tolerance) break;
         ((error > 0) == rising ? high : low) = x;
-        x = at.slope != 0 ? x - error / at.slope : 0.5f * (low + high);
+        x = at.slope < 0 || at.slope > 0 ? x - error / at.slope : 0.5f * (low + high);
     }
     return x;
 }
@@ -244,10 +246,11 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float 
                     ga = invert_exit(p, at.inverse_index, at.index_excess, enter, a, at_a, b, at_b, 0.02f * s);
                 if (falling ? leave > at_b.phi : leave < at_b.phi)
                     gb = invert_exit(p, at.inverse_index, at.index_excess, leave, a, at_a, b, at_b, 0.02f * s);
-                ga = ga > a ? ga : a, gb = gb < b ? gb : b;
+                ga = ga > a ? ga : a;
+                gb = gb < b ? gb : b;
                 if (!(gb > ga)) continue;
-                const float sa = ga == a ? at_a.slope : exit_of(p, at.inverse_index, at.index_excess, ga).slope;
-                const float sb = gb == b ? at_b.slope : exit_of(p, at.inverse_index, at.index_excess, gb).slope;
+                const float sa = !(ga > a) ? at_a.slope : exit_of(p, at.inverse_index, at.index_excess, ga).slope;
+                const float sb = !(gb < b) ? at_b.slope : exit_of(p, at.inverse_index, at.index_excess, gb).slope;
                 const float steepest = ga < 0 && gb > 0 && p == 2 ? slope : greater(std::abs(sa), std::abs(sb));
                 // The image that is y alone: the others' tails are not within this reach of theirs.
                 integrate_piece(field, p, ga, gb, steepest / s, [&](const Path<Four>& path, Four weight) {
@@ -256,7 +259,8 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float 
                 });
             }
         }
-        a = b, at_a = at_b;
+        a = b;
+        at_a = at_b;
     }
 }
 
@@ -271,17 +275,23 @@ MEDULLA_FN void place_cuts(FarField<Channels>& field) noexcept {
         of.count = cuts.count;
         for (int i = 0; i < cuts.count; ++i) {
             const Exit exit = exit_of(p, at.inverse_index, at.index_excess, cuts.gamma[i]);
-            of.gamma[i] = cuts.gamma[i], of.phi[i] = exit.phi, of.slope[i] = exit.slope;
+            of.gamma[i] = cuts.gamma[i];
+            of.phi[i] = exit.phi;
+            of.slope[i] = exit.slope;
         }
     };
-    const auto both = [&](float gamma) { cuts.insert(gamma, low, high), cuts.insert(-gamma, low, high); };
+    const auto both = [&](float gamma) {
+        cuts.insert(gamma, low, high);
+        cuts.insert(-gamma, low, high);
+    };
     const auto both_at = [&](float c) { both(angle(std::sqrt((1 - c) * (1 + c)), c)); };
     // The cuticle's F changes over cos gamma_i ~ sqrt(eta'^2 - 1) as eta' -> 1, and ~ 1 / eta' as eta' -> infinity, and
     // with few layers later.
     const float few = lesser(1.0f, greater(2 * field.layers, 0.0625f));
     const float scale = lesser(std::sqrt(at.index_excess), at.inverse_index) * few;
     for (float c = 2 * scale; c < 0.8f; c *= 4) both_at(c);
-    cuts.insert(low, low - 1, high), cuts.insert(high, low, high + 1);
+    cuts.insert(low, low - 1, high);
+    cuts.insert(high, low, high + 1);
     keep(0);
     if (field.rim < 1 && field.kappa > 0) both(field.gamma_rim);
     // What a dense medulla lets through leaves next to its rim, over psi ~ 1 / tau.
@@ -373,7 +383,7 @@ MEDULLA_FN void visit_scattered(const FarField<Channels>& field, Visit&& visit) 
 /// Mean energy and probability of the residual lobe, which is even in phi: once a field.
 template <int Channels>
 MEDULLA_FN void average_residual(FarField<Channels>& field) noexcept {
-    Four energy[Channels], probability;
+    Four energy[std::size_t(Channels)], probability;
     const LobeCuts& cuts = field.cuts[1];
     for (int i = 1; i < cuts.count; ++i)
         integrate_piece(field, 1, cuts.gamma[i - 1], cuts.gamma[i], 0.0f, [&](const Path<Four>& path, Four weight) {
@@ -450,7 +460,7 @@ MEDULLA_FN typename FarField<Channels>::Means FarField<Channels>::means(float ph
     Means m;
     for (int p = 0; p < 3; ++p) {
         if (!(mask >> p & 1u)) continue;
-        Four N[Channels], probability;
+        Four N[std::size_t(Channels)], probability;
         visit_unscattered(*this, p, phi, [&](const Path<Four>& path, Four weight, Four D) {
             const Energies<Channels, Four> e = energies_at(*this, path);
             Four share[all_lobe_count];
@@ -485,7 +495,8 @@ MEDULLA_FN typename FarField<Channels>::Means FarField<Channels>::means(float ph
                          second = exit_places(y[1], Four(2 * t.phi.end));
         for (int i = 0; i < 4; ++i) {
             set_offset(t, lane(offset, i), at);
-            D[0][i] = azimuthal_density(t, at, first, i), D[1][i] = azimuthal_density(t, at, second, i);
+            D[0][i] = azimuthal_density(t, at, first, i);
+            D[1][i] = azimuthal_density(t, at, second, i);
         }
         for (int p = 0; p < 2; ++p) {
             const Four value = weight * four_at(D[p]);

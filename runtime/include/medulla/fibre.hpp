@@ -4,6 +4,7 @@
 
 #include <cassert>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "medulla/config.hpp"
@@ -59,7 +60,7 @@ struct Fibre {
     alignas(16) float shift[4] = {};          ///< alpha_p of Table 2 for R, TT, TRT and the residual lobe [radians]
     alignas(16) float deviation[4] = {};      ///< beta_p of Table 2 [radians]
     detail::WrappedGaussians azimuthal = {};  ///< variance (p + 1) beta_n^2 (Eq. 16)
-    alignas(16) float sigma_ca[detail::channel_lanes<Channels>] = {};  ///< the parameters', padded with 0
+    alignas(16) float sigma_ca[std::size_t(detail::channel_lanes<Channels>)] = {};  ///< the parameters', padded with 0
     alignas(16) float g_weight[4] = {};                                ///< of rows of g
     std::uint32_t g_count = 0, g_first = 0;
 };

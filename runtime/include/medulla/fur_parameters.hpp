@@ -2,6 +2,8 @@
 // Rests on Yan et al. 2017, Tables 1 and 4; lengths are in fibre radii, angles in radians.
 #pragma once
 
+#include <cstddef>
+
 #include <cstdint>
 
 #include "medulla/config.hpp"
@@ -21,16 +23,16 @@ enum class Fresnel : int {
 template <int Channels = 3, class T = float>
 struct FurParameters {
     static_assert(Channels >= 1, "a colour has at least one channel");
-    T eta = T(1.55f);           ///< refractive index of cortex and medulla [1], in (1, 10]
-    T kappa = T(0);             ///< medullary index: medulla's radius [fibre radii], in [0, 1]; 0 = hair
-    T alpha = T(0);             ///< tilt of the cuticle's scales [radians], in [-pi/2, pi/2]
-    T beta_m = T(0.1f);         ///< longitudinal roughness, standard deviation [radians], in [1e-4, 4]
-    T beta_n = T(0.1f);         ///< azimuthal roughness, standard deviation [radians], in [1e-4, 4]
-    T layers = T(1);            ///< layers of the cuticle [1], in [0, 1000], need not be whole
-    T sigma_ms = T(0);          ///< scattering coefficient of the medulla [1 / fibre radius], in [0, 1e9]
-    T sigma_ma = T(0);          ///< absorption coefficient of the medulla [1 / fibre radius], in [0, 1e9]
-    T sigma_ca[Channels] = {};  ///< absorption coefficient of the cortex [1 / fibre radius], in [0, 1e9]
-    T g = T(0);                 ///< mean cosine of the medulla's phase function [1], in (-1, 1)
+    T eta = T(1.55f);                        ///< refractive index of cortex and medulla [1], in (1, 10]
+    T kappa = T(0);                          ///< medullary index: medulla's radius [fibre radii], in [0, 1]; 0 = hair
+    T alpha = T(0);                          ///< tilt of the cuticle's scales [radians], in [-pi/2, pi/2]
+    T beta_m = T(0.1f);                      ///< longitudinal roughness, standard deviation [radians], in [1e-4, 4]
+    T beta_n = T(0.1f);                      ///< azimuthal roughness, standard deviation [radians], in [1e-4, 4]
+    T layers = T(1);                         ///< layers of the cuticle [1], in [0, 1000], need not be whole
+    T sigma_ms = T(0);                       ///< scattering coefficient of the medulla [1 / fibre radius], in [0, 1e9]
+    T sigma_ma = T(0);                       ///< absorption coefficient of the medulla [1 / fibre radius], in [0, 1e9]
+    T sigma_ca[std::size_t(Channels)] = {};  ///< absorption coefficient of the cortex [1 / fibre radius], in [0, 1e9]
+    T g = T(0);                              ///< mean cosine of the medulla's phase function [1], in (-1, 1)
     Fresnel fresnel = Fresnel::bravais;
 };
 
@@ -56,26 +58,27 @@ inline constexpr const char* parameter_ranges[parameter_count] = {
     "(1, 10]",   "[0, 1]",   "[-pi/2, pi/2]", "[1e-4, 4] radians", "[1e-4, 4] radians",
     "[0, 1000]", "[0, 1e9]", "[0, 1e9]",      "[0, 1e9]",          "(-1, 1)"};
 
-/// A row of Table 4 as printed: degrees, one grey sigma_ca.
+/// A row of Table 4 as printed: degrees, one grey sigma_ca; and a colour chosen by eye, which the table has not.
 struct FurPreset {
     const char* name;
     float kappa, eta;                    ///< [1]
     float alpha, beta_m, beta_n;         ///< [degrees]
     float sigma_ca, sigma_ms, sigma_ma;  ///< [1 / fibre radius]; Table 4 prints 'diameter^-1', see docs/bcsdf.md
     float g, layers;                     ///< [1]
+    float coat[3];  ///< sigma_ca of red, green and blue, chosen by eye about the printed one [1 / fibre radius]
 };
 
 inline constexpr FurPreset fur_presets[] = {
-    {"bobcat", 0.88f, 1.69f, 5.48f, 11.64f, 7.49f, 0.64f, 1.69f, 0.17f, 0.44f, 0.47f},
-    {"cat", 0.87f, 1.36f, 3.65f, 5.66f, 1.34f, 0.06f, 2.47f, 0.12f, 0.60f, 0.44f},
-    {"deer", 0.91f, 1.60f, 3.52f, 7.00f, 4.53f, 1.39f, 2.51f, 0.09f, 0.46f, 0.45f},
-    {"dog", 0.68f, 1.58f, 2.94f, 5.77f, 18.94f, 0.01f, 2.44f, 0.00f, 0.26f, 0.60f},
-    {"mouse", 0.66f, 1.35f, 0.55f, 8.39f, 2.80f, 0.04f, 1.34f, 0.06f, 0.36f, 2.36f},
-    {"rabbit", 0.79f, 1.47f, 3.14f, 11.91f, 10.52f, 0.24f, 0.78f, 0.10f, 0.12f, 1.03f},
-    {"raccoon", 0.65f, 1.19f, 1.81f, 7.44f, 6.88f, 0.25f, 2.30f, 0.14f, 0.08f, 2.00f},
-    {"red_fox", 0.86f, 1.49f, 2.64f, 9.45f, 17.63f, 0.39f, 3.15f, 0.21f, 0.79f, 0.68f},
-    {"springbok", 0.82f, 1.48f, 4.61f, 8.02f, 11.46f, 0.32f, 2.45f, 0.31f, 0.19f, 0.46f},
-    {"human", 0.36f, 1.20f, 0.70f, 2.05f, 3.75f, 0.41f, 3.49f, 0.00f, 0.28f, 1.79f},
+    {"bobcat", 0.88f, 1.69f, 5.48f, 11.64f, 7.49f, 0.64f, 1.69f, 0.17f, 0.44f, 0.47f, {0.35f, 0.6f, 1.05f}},
+    {"cat", 0.87f, 1.36f, 3.65f, 5.66f, 1.34f, 0.06f, 2.47f, 0.12f, 0.60f, 0.44f, {0.05f, 0.06f, 0.08f}},
+    {"deer", 0.91f, 1.60f, 3.52f, 7.00f, 4.53f, 1.39f, 2.51f, 0.09f, 0.46f, 0.45f, {0.75f, 1.45f, 2.6f}},
+    {"dog", 0.68f, 1.58f, 2.94f, 5.77f, 18.94f, 0.01f, 2.44f, 0.00f, 0.26f, 0.60f, {0.01f, 0.015f, 0.03f}},
+    {"mouse", 0.66f, 1.35f, 0.55f, 8.39f, 2.80f, 0.04f, 1.34f, 0.06f, 0.36f, 2.36f, {0.04f, 0.045f, 0.05f}},
+    {"rabbit", 0.79f, 1.47f, 3.14f, 11.91f, 10.52f, 0.24f, 0.78f, 0.10f, 0.12f, 1.03f, {0.16f, 0.25f, 0.4f}},
+    {"raccoon", 0.65f, 1.19f, 1.81f, 7.44f, 6.88f, 0.25f, 2.30f, 0.14f, 0.08f, 2.00f, {0.22f, 0.25f, 0.3f}},
+    {"red_fox", 0.86f, 1.49f, 2.64f, 9.45f, 17.63f, 0.39f, 3.15f, 0.21f, 0.79f, 0.68f, {0.12f, 0.55f, 1.6f}},
+    {"springbok", 0.82f, 1.48f, 4.61f, 8.02f, 11.46f, 0.32f, 2.45f, 0.31f, 0.19f, 0.46f, {0.15f, 0.33f, 0.75f}},
+    {"human", 0.36f, 1.20f, 0.70f, 2.05f, 3.75f, 0.41f, 3.49f, 0.00f, 0.28f, 1.79f, {0.22f, 0.45f, 0.9f}},
 };
 inline constexpr int fur_preset_count = int(sizeof fur_presets / sizeof fur_presets[0]);
 
@@ -91,11 +94,21 @@ MEDULLA_FN constexpr FurParameters<Channels> parameters_of(const FurPreset& pres
     return p;
 }
 
+/// The same in colour: `coat` in place of the printed grey sigma_ca.
+MEDULLA_FN constexpr FurParameters<3> coloured_parameters_of(const FurPreset& preset) noexcept {
+    FurParameters<3> p = parameters_of<3>(preset);
+    for (int c = 0; c < 3; ++c) p.sigma_ca[c] = preset.coat[c];
+    return p;
+}
+
 /// The preset of this name, or null.
 constexpr const FurPreset* find_preset(const char* name) noexcept {
     for (const FurPreset& preset : fur_presets) {
         const char *a = name, *b = preset.name;
-        while (*a != 0 && *a == *b) ++a, ++b;
+        while (*a != 0 && *a == *b) {
+            ++a;
+            ++b;
+        }
         if (*a == *b) return &preset;
     }
     return nullptr;
@@ -105,7 +118,8 @@ namespace detail {
 
 /// x within [low, high], 0 <= low: compared as bits, so that a NaN is out of range under -ffast-math too.
 MEDULLA_HOT bool within(float x, float low, float high) noexcept {
-    return bits_of(x) - bits_of(low) <= bits_of(high) - bits_of(low) || (low == 0 && bits_of(x) == 0x80000000u);
+    return bits_of(x) - bits_of(low) <= bits_of(high) - bits_of(low) ||
+           (bits_of(low) == 0 && bits_of(x) == 0x80000000u);
 }
 inline constexpr float greatest_below_1 = 0.99999994f, least_above_1 = 1.0000001f;
 

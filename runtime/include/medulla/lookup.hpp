@@ -22,18 +22,10 @@ struct LobeQuery {
     float absorption = 0;  ///< optical radius of absorption [1], >= 0
 
     MEDULLA_FN float operator[](Quantity quantity) const noexcept {
-        switch (quantity) {
-            case Quantity::sigma:
-                return sigma;
-            case Quantity::g:
-                return g;
-            case Quantity::absorption:
-                return absorption;
-            case Quantity::h:
-                return h;
-            default:
-                return theta_i;
-        }
+        if (quantity == Quantity::sigma) return sigma;
+        if (quantity == Quantity::g) return g;
+        if (quantity == Quantity::absorption) return absorption;
+        return quantity == Quantity::h ? h : theta_i;
     }
 };
 
@@ -225,10 +217,13 @@ MEDULLA_FN T survival_of(T absorption, T length) noexcept {
 /// Share of the disc's scattered light that absorption leaves; h in [-1, 1]. 1 at absorption 0; NaN above it where the
 /// pack does not know.
 MEDULLA_FN float survival(const PackView& pack, float sigma, float g, float h, float absorption) noexcept {
-    if (absorption == 0) return 1;
+    if (!(absorption > 0 || absorption < 0)) return 1;
     if (!absorbs(pack)) return detail::not_a_number();
     LobeQuery query;
-    query.sigma = sigma, query.g = g, query.h = h < 0 ? -h : h, query.absorption = absorption;
+    query.sigma = sigma;
+    query.g = g;
+    query.h = h < 0 ? -h : h;
+    query.absorption = absorption;
     const TableView& table = pack[TableKind::survival];
     return survival_of(absorption, scalar(table, contract(table, query)));
 }
@@ -241,7 +236,10 @@ MEDULLA_FN float azimuthal(const PackView& pack, float sigma, float g, float h, 
     if (!table) return detail::not_a_number();
     const float side = h < 0 ? -1.0f : 1.0f;
     LobeQuery query;
-    query.sigma = sigma, query.g = g, query.h = side * h, query.absorption = absorption;
+    query.sigma = sigma;
+    query.g = g;
+    query.h = side * h;
+    query.absorption = absorption;
     const float energy = azimuthal_energy(sigma, h) * survival(pack, sigma, g, h, absorption);
     return energy * lobe(table, contract(table, query), side * phi);
 }
@@ -256,7 +254,9 @@ MEDULLA_FN float longitudinal(const PackView& pack, Side which, float sigma, flo
     if (!table) return detail::not_a_number();
     const float side = theta_i < 0 ? -1.0f : 1.0f;
     LobeQuery query;
-    query.sigma = sigma, query.g = g, query.theta_i = side * theta_i;
+    query.sigma = sigma;
+    query.g = g;
+    query.theta_i = side * theta_i;
     return lobe(table, contract(table, query), side * theta_r);
 }
 

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "medulla/config.hpp"
@@ -47,8 +48,8 @@ struct Sample {
 /// Each lobe's factors; its energy per radian^2 of (theta_r, phi) is M N.
 template <int Channels = 3>
 struct LobeValues {
-    float M[all_lobe_count] = {};            ///< longitudinal density [1 / radian]
-    float N[all_lobe_count][Channels] = {};  ///< azimuthal density times energy [1 / radian]
+    float M[all_lobe_count] = {};                         ///< longitudinal density [1 / radian]
+    float N[all_lobe_count][std::size_t(Channels)] = {};  ///< azimuthal density times energy [1 / radian]
 };
 
 /// sum M N over the lobes of a mask: energy per radian^2 of (theta_r, phi).
@@ -106,7 +107,8 @@ MEDULLA_HOT int draw_lobe(const float (&share)[all_lobe_count], float& u) noexce
     float below = 0, at_last = 0;
     for (int k = 0; k < all_lobe_count; ++k) {
         if (!(share[k] > 0)) continue;
-        last = k, at_last = below;
+        last = k;
+        at_last = below;
         if (u < below + share[k]) break;
         below += share[k];
     }
@@ -143,10 +145,11 @@ MEDULLA_HOT float clamp_offset(float h) noexcept { return h < -1 ? -1.0f : (h > 
 template <int Channels = 3>
 struct NearField : detail::FieldBase<Channels> {
     static constexpr int lanes = detail::channel_lanes<Channels>;
-    alignas(16) float centre[4];                 ///< Phi_p of R, TT, TRT [radians]
-    float scattered_centre[2], side;             ///< Phi^s_p + pi of TTs and TRTs [radians]; sign of h
-    float known_theta;                           ///< [radians]
-    alignas(16) float A[all_lobe_count][lanes];  ///< energies of the channels and, last, the lobe's probability
+    alignas(16) float centre[4];      ///< Phi_p of R, TT, TRT [radians]
+    float scattered_centre[2], side;  ///< Phi^s_p + pi of TTs and TRTs [radians]; sign of h
+    float known_theta;                ///< [radians]
+    alignas(16) float A[all_lobe_count]
+                       [std::size_t(lanes)];  ///< energies of the channels and, last, the lobe's probability
 
     /// Energy per steradian about `drawn`.
     MEDULLA_FN Colour<Channels> value(Vector drawn) const noexcept { return evaluate(drawn).value; }
@@ -218,7 +221,8 @@ MEDULLA_HOT detail::LobeDensities NearField<Channels>::densities(float theta_r, 
     const Four delta = Four(phi) - aligned_four_at(centre);
     store_four(joint_pdf(this->longitudinal, this->azimuthal, Four(theta_r), delta), d.x);
     // The residual lobe, lane 3, goes behind the scattered ones.
-    d.x[5] = d.x[3], d.x[3] = d.x[4] = 0;
+    d.x[5] = d.x[3];
+    d.x[3] = d.x[4] = 0;
     if (this->tables == nullptr) return d;
     const Tables& t = *this->tables;
     const ExitPlaces exits = places(theta_r, phi);
@@ -233,7 +237,7 @@ MEDULLA_HOT Evaluation<Channels> NearField<Channels>::at(float theta_r, float co
     using namespace detail;
     const LobeDensities d = densities(theta_r, phi);
     const Four inverse(1 / cosine);
-    alignas(16) float sum[lanes];
+    alignas(16) float sum[std::size_t(lanes)];
     for (int b = 0; b < lanes; b += 4) {
         const Four a = Four(d.x[0]) * aligned_four_at(A[0] + b) + Four(d.x[1]) * aligned_four_at(A[1] + b),
                    c = Four(d.x[2]) * aligned_four_at(A[2] + b) + Four(d.x[3]) * aligned_four_at(A[3] + b),
@@ -322,12 +326,14 @@ MEDULLA_HOT void set_energies(const Fibre<Channels>& fibre, const Path<float>& p
         }
     }
     Four last[4] = {mean[4], mean[5], Four(0.0f), Four(0.0f)};
-    transpose(mean[0], mean[1], mean[2], mean[3]), transpose(last[0], last[1], last[2], last[3]);
+    transpose(mean[0], mean[1], mean[2], mean[3]);
+    transpose(last[0], last[1], last[2], last[3]);
     const Four low = (mean[0] + mean[1]) + (mean[2] + mean[3]), high = (last[0] + last[1]) + (last[2] + last[3]);
     const float total = sum_of(low + high);
     const Four inverse(total > 1e-30f ? 1 / total : 0.0f);
     alignas(16) float share[8];
-    store_four(low * inverse, share), store_four(high * inverse, share + 4);
+    store_four(low * inverse, share);
+    store_four(high * inverse, share + 4);
     for (int k = 0; k < all_lobe_count; ++k) hit.A[k][lanes - 1] = share[k];
     // Less than this in every channel cannot be seen beside 1.
     if (!(lane(high, 0) + lane(low, 3) > negligible_energy)) hit.tables = nullptr;

@@ -5,6 +5,8 @@
 // floor are found by its arguments' namespace. docs/bcsdf.md, 'Other scalars'.
 #pragma once
 
+#include <cstddef>
+
 #include "medulla/config.hpp"
 #include "medulla/detail/cross_section.hpp"
 #include "medulla/detail/gaussian.hpp"
@@ -16,7 +18,7 @@ inline namespace MEDULLA_TARGET {
 template <int Channels = 3, class T = float>
 struct UnscatteredLobes {
     T M[3];            ///< longitudinal density of R, TT, TRT [1 / radian]
-    T N[3][Channels];  ///< azimuthal density times energy [1 / radian]
+    T N[3][std::size_t(Channels)];  ///< azimuthal density times energy [1 / radian]
 };
 
 /// @param p inside the ranges of FurParameters (check() says so for float)

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/elementary.hpp"
@@ -27,7 +28,7 @@ struct Angles {
 
 template <int Channels = 3>
 struct Colour {
-    float value[Channels] = {};
+    float value[std::size_t(Channels)] = {};
     MEDULLA_FN float operator[](int c) const noexcept { return value[c]; }
     MEDULLA_FN float& operator[](int c) noexcept { return value[c]; }
 };

@@ -69,7 +69,10 @@ struct Eight {
 };
 MEDULLA_HOT Eight zero_eight() noexcept { return {_mm_setzero_ps(), _mm_setzero_ps()}; }
 MEDULLA_HOT Eight load_eight(const float* x) noexcept { return {_mm_loadu_ps(x), _mm_loadu_ps(x + 4)}; }
-MEDULLA_HOT void store_eight(Eight a, float* x) noexcept { _mm_storeu_ps(x, a.low), _mm_storeu_ps(x + 4, a.high); }
+MEDULLA_HOT void store_eight(Eight a, float* x) noexcept {
+    _mm_storeu_ps(x, a.low);
+    _mm_storeu_ps(x + 4, a.high);
+}
 template <int bits>
 MEDULLA_HOT Eight convert_eight(const unsigned char* block, Bits<bits> width) noexcept {
     // A word moved to the upper half and shifted down keeps its sign.

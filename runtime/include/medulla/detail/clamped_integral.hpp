@@ -102,7 +102,8 @@ MEDULLA_FN float undershoot(const TableView& table, const float* weight) noexcep
             for (std::uint32_t span = spans; below && span <= row; ++span)
                 sum += span_undershoot(axis, span, c[k] + (span + 3 - row));
         }
-        last = row, spans = row + 1;
+        last = row;
+        spans = row + 1;
     });
     return sum;
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/elementary.hpp"
@@ -50,14 +51,14 @@ struct Path {
 
 /// F_1 = mean over polarisations of R + (1-R)^2 R / (1-R^2) = 2R / (1+R), F = l F_1 / (1 + (l-1) F_1) (Eq. 13).
 /// Differences are expanded so that n -> 1 and cos_i -> 0 lose no digits (docs/bcsdf.md, 'Fresnel').
-/// T is S, or several S side by side; I is either.
+/// T is S, or several S side by side; At is either.
 /// @param index_excess n^2 - 1  @param cos_i cosine of incidence
 /// @param x sqrt(index_excess + cos_i^2) = n times the cosine of refraction
-template <class T, class S, class I>
-MEDULLA_FN Cuticle<T> cuticle(S layers, I index_excess, T cos_i, T x) noexcept {
+template <class T, class S, class At>
+MEDULLA_FN Cuticle<T> cuticle(S layers, At index_excess, T cos_i, T x) noexcept {
     // Fewer layers than 1e-30 would be seen at h = 1 alone, where T1 is 0, and there 1 / (layers F1) may overflow.
     if (!(layers > S(1e-30))) return {T(S(0)), T(S(1))};
-    const T one = T(S(1)), m = T(index_excess), index2 = T(I(S(1)) + index_excess);
+    const T one = T(S(1)), m = T(index_excess), index2 = T(At(S(1)) + index_excess);
     const T s = cos_i + x, p = index2 * cos_i + x, inverse = one / (s * p), inverse_s = p * inverse,
             inverse_p = s * inverse;
     const T rs = m * inverse_s * inverse_s;
@@ -73,8 +74,8 @@ MEDULLA_FN Cuticle<T> cuticle(S layers, I index_excess, T cos_i, T x) noexcept {
 }
 
 /// The path, from the angles of incidence and refraction. @param x sqrt(eta'^2 - 1 + cos^2 gamma_i) = eta' cos gamma_t
-template <class T, class S, class I>
-MEDULLA_HOT Path<T> path_at(const Inclination<I>& at, S kappa, S layers, T cos_i, T sin_t, T x, T gamma_i,
+template <class T, class S, class At>
+MEDULLA_HOT Path<T> path_at(const Inclination<At>& at, S kappa, S layers, T cos_i, T sin_t, T x, T gamma_i,
                             T gamma_t) noexcept {
     Path<T> path;
     const T zero = T(S(0)), cos_t = x * T(at.inverse_index);
@@ -93,8 +94,8 @@ MEDULLA_HOT Path<T> path_at(const Inclination<I>& at, S kappa, S layers, T cos_i
 
 /// @param at of all, or of each of several rays side by side
 /// @param cos_i cos gamma_i = sqrt(1 - h^2), given beside h because the caller often has it without cancellation
-template <class T, class S, class I>
-MEDULLA_HOT Path<T> trace(const Inclination<I>& at, S kappa, S layers, T h, T cos_i) noexcept {
+template <class T, class S, class At>
+MEDULLA_HOT Path<T> trace(const Inclination<At>& at, S kappa, S layers, T h, T cos_i) noexcept {
     const T x = square_root(T(at.index_excess) + cos_i * cos_i);
     const T sin_t = h * T(at.inverse_index), cos_t = x * T(at.inverse_index);
     const T sines[2] = {h, sin_t}, cosines[2] = {cos_i, cos_t};
@@ -122,8 +123,8 @@ template <int Channels, class T = float>
 struct Absorption {
     T medulla_extinction;  ///< (sigma_ma + sigma_ms) / cos theta_t
     T medulla_scattering;  ///< sigma_ms / cos theta_t
-    T cortex[Channels];    ///< sigma_ca / cos theta_t
-    T T_b[Channels];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
+    T cortex[std::size_t(Channels)];    ///< sigma_ca / cos theta_t
+    T T_b[std::size_t(Channels)];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
 };
 
 /// @param inverse_cos_t of one inclination or of several side by side
@@ -151,7 +152,7 @@ MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, S>& 
 /// later ones is (1 - F) F^2 x^2 (s + (1 - F) x) / (1 - F x). Without absorption s + x = 1 and all six add up to 1.
 template <int Channels, class T = float>
 struct Energies {
-    T A[all_lobe_count][Channels];
+    T A[all_lobe_count][std::size_t(Channels)];
 };
 
 /// @param survival share of the scattered light that the medulla's absorption leaves, where tables know it, else 1
@@ -161,13 +162,13 @@ MEDULLA_HOT Energies<Channels, T> energies(const Path<T>& path, const Absorption
     Energies<Channels, T> e;
     const T one = T(S(1)), zero = T(S(0));
     const T F = path.cuticle.F, passed = path.cuticle.T_, depth = path.s_m * T(S(2) * a.medulla_scattering);
-    T left[Channels + 2];  // after half-lengths of cortex, of medulla, and a chord's scattering alone
+    T left[std::size_t(Channels) + 2];  // after half-lengths of cortex, of medulla, and a chord's scattering alone
     for (int c = 0; c < Channels; ++c) left[c] = -path.s_c * T(a.cortex[c]);
-    left[Channels] = -path.s_m * T(a.medulla_extinction), left[Channels + 1] = -depth;
-    T crossing[Channels];  // optical length of a whole crossing
-    for (int c = 0; c < Channels; ++c) crossing[c] = T(S(-2)) * (left[c] + left[Channels]);
+    left[std::size_t(Channels)] = -path.s_m * T(a.medulla_extinction), left[std::size_t(Channels) + 1] = -depth;
+    T crossing[std::size_t(Channels)];  // optical length of a whole crossing
+    for (int c = 0; c < Channels; ++c) crossing[c] = T(S(-2)) * (left[c] + left[std::size_t(Channels)]);
     exponentials(left);
-    const T m = left[Channels], E = scattered ? absorbed(depth, left[Channels + 1]) * survival : zero;
+    const T m = left[std::size_t(Channels)], E = scattered ? absorbed(depth, left[std::size_t(Channels) + 1]) * survival : zero;
     const T third = passed * F * F;
     for (int c = 0; c < Channels; ++c) {
         const T q = left[c], through = (q * m) * (q * m);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/lanes.hpp"
@@ -95,17 +96,17 @@ MEDULLA_FN float exponential(float x) noexcept { return polynomial::exponential(
 MEDULLA_FN Four exponential(Four x) noexcept { return polynomial::exponential(x); }
 
 /// exp(x[i]) in the place of each x[i]; floats four abreast.
-template <int n, class T>
+template <std::size_t n, class T>
 MEDULLA_FN void exponentials(T (&x)[n]) noexcept {
-    for (int i = 0; i < n; ++i) x[i] = exponential(x[i]);
+    for (T& value : x) value = exponential(value);
 }
-template <int n>
+template <std::size_t n>
 MEDULLA_FN void exponentials(float (&x)[n]) noexcept {
-    for (int i = 0; i < n; i += 4) {
-        const int more = n - i - 1;  // beyond x[i]
+    for (std::size_t i = 0; i < n; i += 4) {
+        const std::size_t more = n - i - 1;  // beyond x[i]
         const Four e =
             exponential(Four(x[i], x[more > 0 ? i + 1 : i], x[more > 1 ? i + 2 : i], x[more > 2 ? i + 3 : i]));
-        for (int k = 0; k <= more && k < 4; ++k) x[i + k] = lane(e, k);
+        for (std::size_t k = 0; k <= more && k < 4; ++k) x[i + k] = lane(e, int(k));
     }
 }
 

@@ -267,13 +267,17 @@ MEDULLA_HOT TruncatedGaussians truncated_gaussians(Four centre, Four deviation) 
     const Four beyond_closer = normal_half_mass(greater(closer, zero)),
                beyond_farther = any(farther < Four(6.0f)) ? normal_half_mass(farther) : Four(0.5f);
     TruncatedGaussians g;
-    store_four(centre, g.origin), store_four(inverse, g.inverse), store_four(zero, g.beyond);
+    store_four(centre, g.origin);
+    store_four(inverse, g.inverse);
+    store_four(zero, g.beyond);
     store_four(Four(0.39894228f) * inverse / (beyond_closer + beyond_farther), g.peak);
     if (!any(closer < zero)) return g;
     for (int i = 0; i < 4; ++i) {
         if (!(lane(closer, i) < 0)) continue;
         const TruncatedGaussian<float> one = truncated_gaussian(lane(centre, i), lane(deviation, i));
-        g.origin[i] = one.origin, g.beyond[i] = one.beyond, g.peak[i] = one.peak;
+        g.origin[i] = one.origin;
+        g.beyond[i] = one.beyond;
+        g.peak[i] = one.peak;
     }
     return g;
 }

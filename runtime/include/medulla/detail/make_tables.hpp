@@ -20,9 +20,9 @@ namespace detail {
 /// Rows of a made-to-measure axis at most: the system that is solved for them stands on the stack.
 inline constexpr std::uint32_t most_range_rows = 40;
 
-/// The axis of g: lobes are analytic in g up to |g| = 1, and steps are a share of the distance to it. Steps of both axes
-/// are such that lobes differ from the factors' by a relative L2 of 3e-4 at most over a coat's ranges, and of 6e-4 over
-/// the whole pack (tests/test_dense_tables.cpp); with steps twice as long it is 1e-3 and 8e-3.
+/// The axis of g: lobes are analytic in g up to |g| = 1, and steps are a share of the distance to it. Steps of both
+/// axes are such that lobes differ from the factors' by a relative L2 of 3e-4 at most over a coat's ranges, and of 6e-4
+/// over the whole pack (tests/test_dense_tables.cpp); with steps twice as long it is 1e-3 and 8e-3.
 struct GStep {
     MEDULLA_FN double operator()(double g) const noexcept { return 0.2 * (1 - std::abs(g)); }
 };
@@ -83,7 +83,8 @@ MEDULLA_FN bool clip_range(const TableView& a, const TableView& b, Quantity quan
 MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, TablesPlan& plan) noexcept {
     const auto fail = [&](TablesStatus status) { plan.status = status; };
     plan.azimuthal = pack[TableKind::azimuthal];
-    plan.side[0] = pack[TableKind::longitudinal_back], plan.side[1] = pack[TableKind::longitudinal_forward];
+    plan.side[0] = pack[TableKind::longitudinal_back];
+    plan.side[1] = pack[TableKind::longitudinal_forward];
     if (!plan.azimuthal) return fail(TablesStatus::no_azimuthal_table);
     if (!plan.side[0] || !plan.side[1]) return fail(TablesStatus::no_longitudinal_table);
     if (!same_axis(plan.side[0], plan.side[1], Quantity::theta_i) ||
@@ -93,7 +94,9 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     if (plan.survival && !same_axis(plan.azimuthal, plan.survival, Quantity::h)) return fail(TablesStatus::bad_axes);
 
     Tables& t = plan.layout;
-    t.magic = tables_magic, t.absorbs = plan.survival ? 1u : 0u, t.ranges = asked;
+    t.magic = tables_magic;
+    t.absorbs = plan.survival ? 1u : 0u;
+    t.ranges = asked;
     TableRanges& r = t.ranges;
     if (!clip_range(plan.azimuthal, plan.side[0], Quantity::g, r.g_low, r.g_high) ||
         !clip_range(plan.azimuthal, plan.side[0], Quantity::sigma, r.sigma_low, r.sigma_high) ||
@@ -103,7 +106,10 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     double low = std::sqrt(double(r.sigma_low)), high = std::sqrt(double(r.sigma_high));
     const double widest = double(axis_of(plan.azimuthal, Quantity::sigma).upper());
     if (high < low * 1.01 + 1e-3) high = low * 1.01 + 1e-3;
-    if (high > widest) high = widest, low = low < 0.99 * high ? low : 0.99 * high;
+    if (high > widest) {
+        high = widest;
+        low = low < 0.99 * high ? low : 0.99 * high;
+    }
     plan_range(low, high, SigmaStep{}, plan.axis[0]);
     const bool one_g = !(r.g_high > r.g_low);
     plan_range(double(r.g_low), one_g ? double(r.g_low) + 0.01 : double(r.g_high), GStep{}, plan.axis[1]);
@@ -124,7 +130,8 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     for (int k = 0; k < 6; ++k) {
         if (!fits(plan.axis[k])) return fail(TablesStatus::bad_axes);
         plan.stretches[k] = plan.axis[k].stretches();
-        axes[k]->spans = plan.axis[k].spans, axes[k]->rows = plan.axis[k].spans + 3;
+        axes[k]->spans = plan.axis[k].spans;
+        axes[k]->rows = plan.axis[k].spans + 3;
         const std::uint32_t from =
             static_cast<std::uint32_t>(reinterpret_cast<const char*>(axes[k]) - reinterpret_cast<const char*>(&t));
         axes[k]->spans_offset = place(sizeof(SplineSpan) * plan.axis[k].spans) - from;
@@ -175,15 +182,22 @@ struct SplineSolve {
                 if (std::abs(a[i][c]) > std::abs(a[pivot][c])) pivot = i;
             for (std::uint32_t k = 0; k < rows; ++k) {
                 const double x = a[c][k], y = inverse[c][k];
-                a[c][k] = a[pivot][k], a[pivot][k] = x;
-                inverse[c][k] = inverse[pivot][k], inverse[pivot][k] = y;
+                a[c][k] = a[pivot][k];
+                a[pivot][k] = x;
+                inverse[c][k] = inverse[pivot][k];
+                inverse[pivot][k] = y;
             }
             const double factor = 1 / a[c][c];
-            for (std::uint32_t k = 0; k < rows; ++k) a[c][k] *= factor, inverse[c][k] *= factor;
+            for (std::uint32_t k = 0; k < rows; ++k) {
+                a[c][k] *= factor;
+                inverse[c][k] *= factor;
+            }
             for (std::uint32_t i = 0; i < rows; ++i) {
                 const double by = i == c ? 0 : a[i][c];
-                if (by == 0) continue;
-                for (std::uint32_t k = 0; k < rows; ++k) a[i][k] -= by * a[c][k], inverse[i][k] -= by * inverse[c][k];
+                for (std::uint32_t k = 0; k < rows; ++k) {
+                    a[i][k] -= by * a[c][k];
+                    inverse[i][k] -= by * inverse[c][k];
+                }
             }
         }
     }
@@ -217,7 +231,8 @@ MEDULLA_FN void expand_rows(const TableView& view, const float* weight, float* t
     for (std::uint32_t j = 0; j < rows; ++j, to += row_step) {
         scale_by_row(view, last, j, weight, at);
         exit_coefficients(view, at, [&](std::uint32_t k, float positive, float negative) {
-            to[step * k] = positive, to[step * (exits + k)] = negative;
+            to[step * k] = positive;
+            to[step * (exits + k)] = negative;
         });
     }
 }

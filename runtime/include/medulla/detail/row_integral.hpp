@@ -49,7 +49,7 @@ MEDULLA_FN float positive_integral(const Cubic& f, float a, float b) noexcept {
     const float discriminant = f.p[2] * f.p[2] - 3 * f.p[1] * f.p[3];
     if (discriminant > 0) {
         const float root = std::sqrt(discriminant), q = -(f.p[2] + (f.p[2] < 0 ? -root : root));
-        const float s = f.p[3] != 0 ? q / (3 * f.p[3]) : a, t = q != 0 ? f.p[1] / q : a;
+        const float s = bits_of(f.p[3]) << 1 ? q / (3 * f.p[3]) : a, t = bits_of(q) << 1 ? f.p[1] / q : a;
         const float ascending[2] = {s < t ? s : t, s < t ? t : s};
         for (const float x : ascending)
             if (x > end[parts - 1] && x < b) end[parts++] = x;

@@ -153,14 +153,18 @@ MEDULLA_FN bool fits(const AxisPlan& plan) noexcept {
 MEDULLA_FN void write_axis(const AxisPlan& plan, std::uint32_t stretches, SplineAxis& axis, SplineSpan* spans,
                            std::uint16_t* start, SplineBlock* blocks) noexcept {
     const double lower = plan.lower(), scale = double(stretches) / (plan.upper() - lower);
-    axis.lower = float(lower), axis.scale = float(scale), axis.end = float(stretches);
+    axis.lower = float(lower);
+    axis.scale = float(scale);
+    axis.end = float(stretches);
     axis.inverse_scale = float(1 / scale);
-    axis.spans = plan.spans, axis.rows = plan.spans + 3;
+    axis.spans = plan.spans;
+    axis.rows = plan.spans + 3;
     std::uint32_t from = 0;
     for (std::uint32_t i = 0; i < plan.spans; ++i) {
         const double a = plan.knot(std::int32_t(i)), b = plan.knot(std::int32_t(i) + 1);
         SplineSpan& s = spans[i];
-        s.middle = float(0.5 * (a + b - 2 * lower) * scale), s.half = float(0.5 * (b - a) * scale);
+        s.middle = float(0.5 * (a + b - 2 * lower) * scale);
+        s.half = float(0.5 * (b - a) * scale);
         s.unused[0] = s.unused[1] = 0;
         double at[4][4];
         for (int k = 0; k < 4; ++k) plan.weights(i, a + (b - a) * k / 3, at[k]);
@@ -172,8 +176,10 @@ MEDULLA_FN void write_axis(const AxisPlan& plan, std::uint32_t stretches, Spline
             const double power[4] = {(9 * (q + u) - (p + v)) / 16, (27 * (u - q) - (v - p)) / 8,
                                      2.25 * ((p + v) - (q + u)), 4.5 * ((v - p) - 3 * (u - q))};
             double unit = 1;
-            for (int k = 0; k < 4; ++k, unit /= span_length)
-                s.weights.power[k][r] = float(power[k] * unit), excess[k] += double(s.weights.power[k][r]);
+            for (int k = 0; k < 4; ++k, unit /= span_length) {
+                s.weights.power[k][r] = float(power[k] * unit);
+                excess[k] += double(s.weights.power[k][r]);
+            }
             if (at[1][r] + at[2][r] > at[1][largest] + at[2][largest]) largest = r;
         }
         // Weights add up to 1 to the rounding of their sum.

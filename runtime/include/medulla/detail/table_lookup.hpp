@@ -35,12 +35,14 @@ struct TableRows {
 
 MEDULLA_HOT void set_g(const SplineAxis& axis, std::uint32_t rows, float g, TableRows& at) noexcept {
     if (rows == 1) {
-        at.g_count = 1, at.g_first = 0;
+        at.g_count = 1;
+        at.g_first = 0;
         store_four(Four(1, 0, 0, 0), at.g);
         return;
     }
     const RowPoint p = axis.at(g);
-    at.g_count = 4, at.g_first = p.first;
+    at.g_count = 4;
+    at.g_first = p.first;
     store_four(p.weight, at.g);
 }
 MEDULLA_HOT void set_row(const SplineAxis& axis, float coordinate, std::uint32_t& first, float (&weight)[4]) noexcept {
@@ -72,7 +74,8 @@ struct ExitPlaces {
 MEDULLA_HOT ExitPlaces exit_places(Four turns, Four scale) noexcept {
     ExitPlaces p;
     const Four u = magnitude(turns) * scale;
-    store_whole(u, p.stretch), store_four(u, p.place);
+    store_whole(u, p.stretch);
+    store_four(u, p.place);
     p.below = below_zero(turns);
     return p;
 }

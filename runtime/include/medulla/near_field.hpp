@@ -133,7 +133,7 @@ MEDULLA_HOT void set_sample(const Polar& known, Lobe lobe, float theta, float ph
     s.direction = {-t.sine, t.cosine * (known.y * p.cosine - known.z * p.sine),
                    t.cosine * (known.z * p.cosine + known.y * p.sine)};
     s.pdf = e.pdf, s.value = e.value;
-    const float inverse = 1 / e.pdf;
+    const float inverse = 1 / greater(e.pdf, 1e-37f);  // of a lesser one it is infinite
     for (int c = 0; c < Channels; ++c) s.weight[c] = e.value[c] * inverse;
 }
 

@@ -230,6 +230,9 @@ TEST_CASE("all four rounding modes give the same light, and no operation is inva
             p.layers = i % 10 == 5 ? 0 : fibre.parameters.layers;
             const Angles known = {i % 8 == 7 ? 1.57f : 1.4f * u(random), 3 * u(random)},
                          drawn = {1.4f * u(random), 3 * u(random)};
+            // Next to the medulla's rim a chord's length is a root of what rounding leaves: 1e-7 / 0.02 away from it.
+            const float inverse_index = detail::inclination(p.eta, std::cos(known.theta)).inverse_index;
+            if (std::abs(std::abs(h) * inverse_index - p.kappa) < 0.02f) continue;
             const Light exact = light(FE_TONEAREST, p, fibre.tables, known, drawn, h);
             for (int mode : {FE_DOWNWARD, FE_UPWARD, FE_TOWARDZERO}) {
                 const Light other = light(mode, p, fibre.tables, known, drawn, h);

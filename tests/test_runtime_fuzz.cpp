@@ -4,11 +4,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <memory>
 #include <random>
 
 #include "medulla/medulla.hpp"
 #include "tests/support/analytic_pack.hpp"
+#include "tests/support/fibre_of.hpp"
 
 using namespace medulla;
 
@@ -64,23 +64,21 @@ TEST_CASE("far field of a dense medulla that reaches the rim, next to grazing li
     const analytic::AnalyticPack pack;
     FurParameters<3> p;
     p.eta = 1.0001f, p.kappa = 1, p.beta_m = p.beta_n = 0.3f, p.layers = 2, p.sigma_ms = 9.87f, p.g = 0.95f;
-    FurFibre<3> fibre;
-    REQUIRE(prepare(p, pack.view, fibre) == FurStatus::ok);
+    const test::FibreOf fibre(p, pack.view);
     for (int i = 0; i < 2000; ++i) {
-        FarField<3> far;
-        far_field(fibre, 1.5692f + 1e-6f * float(i), OffsetRange{}, far);
-        const Colour<3> value = far.eval(0.4f, 3.0f);
-        REQUIRE(good(value.value[0]));
+        const FarField<3> far = far_field(fibre, Angles{1.5692f + 1e-6f * float(i), 0});
+        REQUIRE(good(far.value(Angles{0.4f, 3.0f})[0]));
     }
 }
 
 TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
     const analytic::AnalyticPack pack;
-    const char* wanted = std::getenv("MEDULLA_FUZZ");  // fibres; each is asked 93 times, near, far, by samples
+    const char* wanted =
+        std::getenv("MEDULLA_FUZZ");  // fibres; each is asked some hundred times, near, far, by samples
     const long fibres = wanted ? std::atol(wanted) : 2500;
     Inputs in(7);
-    const auto tables = std::make_unique<UnfoldedTables>();
-    long unfolded = 0, usable_fibres = 0, evaluated = 0, bright = 0, bad = 0;
+    const test::OwnedTables wide(pack.view, {-0.95f, 0.95f, 0, 16, 0});
+    long usable_fibres = 0, evaluated = 0, bright = 0, bad = 0, made = 0, drawn = 0;
     for (long i = 0; i < fibres; ++i) {
         FurParameters<3> p;
         p.eta = in.mostly(1.0001f, 2.5f), p.kappa = in.mostly(0, 1), p.alpha = in.mostly(-0.3f, 0.3f);
@@ -88,9 +86,14 @@ TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
         p.sigma_ms = in.mostly(0, 10), p.sigma_ma = in.mostly(0, 3), p.g = in.mostly(-0.95f, 0.95f);
         for (float& s : p.sigma_ca) s = in.mostly(0, 5);
         p.fresnel = in.uniform() < 0.5f ? Fresnel::bravais : Fresnel::exact;
-        FurFibre<3> fibre;
-        usable_fibres += usable(prepare(p, pack.view, fibre));
-        if (i % 8 == 1) unfolded += unfold(fibre, *tables);
+        // Tables of any ranges, which may be refused; those of everything; none.
+        const test::OwnedTables own(
+            pack.view, i % 8 == 1 ? TableRanges{in.any(-1, 0), in.any(0, 1), in.any(0, 4), in.any(4, 16), in.any(0, 1)}
+                                  : TableRanges{0, 0, 1, 1, 0});
+        made += i % 8 == 1 && own.get() != nullptr;
+        const Tables* tables = i % 8 == 1 ? own.get() : (i % 8 == 2 ? nullptr : wide.get());
+        const Fibre<3> fibre = make_fibre(p, tables, i % 3 == 0 ? OutOfRange::clamp : OutOfRange::black);
+        usable_fibres += fibre.status != FibreStatus::bad_parameters;
         const auto check = [&](float x, const char* what) {
             ++evaluated, bright += x > 0;
             if (good(x)) return;
@@ -99,55 +102,55 @@ TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
                                    << " " << p.beta_n << " layers " << p.layers << " sigma " << p.sigma_ms << " g "
                                    << p.g << " alpha " << p.alpha);
         };
+        const auto check_all = [&](const Evaluation<3>& e, const char* what) {
+            for (float x : e.value.value) check(x, what);
+            check(e.pdf, what);
+        };
+        const auto angles = [&] { return Angles{in.any(-1.5707f, 1.5707f), in.any(-7, 7)}; };
+        const auto vector = [&] { return Vector{in.any(-1, 1), in.any(-1, 1), in.any(-1, 1)}; };
+        const auto numbers = [&] {
+            const auto u = [&] { return in.uniform() < 0.9f ? in.uniform() : (in.uniform() < 0.5f ? 0.0f : 1.0f); };
+            return RandomNumbers{u(), u(), u(), u(), u()};
+        };
+        const auto check_sample = [&](const Sample<3>& s, const char* what) {
+            check(s.pdf, what);
+            for (float w : s.weight.value) check(w, what);
+            if (!s.valid) return;
+            ++drawn;
+            const Vector w = s.direction;
+            const float off = std::abs(w.x * w.x + w.y * w.y + w.z * w.z - 1);
+            check(off < 1e-5f ? 0.0f : -1.0f, "length of a drawn direction");
+        };
         for (int k = 0; k < 8; ++k) {
-            const float theta_i = in.any(-1.5707f, 1.5707f), h = in.any(-1, 1);
-            NearField<3> near;
-            near_field(fibre, theta_i, h, near);
-            float theta_r[8], phi[8];
+            const NearField<3> near =
+                k % 2 ? near_field(fibre, angles(), in.any(-1, 1)) : near_field(fibre, vector(), in.any(-1, 1));
             for (int j = 0; j < 8; ++j) {
-                theta_r[j] = in.any(-1.5707f, 1.5707f), phi[j] = in.any(-7, 7);
-                for (float x : near.eval(theta_r[j], phi[j]).value) check(x, "near");
+                check_all(near.evaluate(angles()), "near");
+                for (float x : near.eq12(in.any(-1.5707f, 1.5707f), in.any(-7, 7)).value) check(x, "Eq. 12");
+                check_sample(near.sample(numbers()), "sample");
             }
-            Colour<3> S[8];
-            eval(near, 8, theta_r, phi, S);
-            for (const Colour<3>& at : S)
-                for (float x : at.value) check(x, "batch");
-            if (k < 1) {
-                NearSampler<3> sampler;
-                sampler.prepare(near);
-                for (int j = 0; j < 8; ++j) {
-                    const auto s =
-                        sampler.sample({in.uniform(), in.uniform(), in.uniform(), in.uniform(), in.uniform()});
-                    check(s.pdf, "pdf");
-                    for (float w : s.weight) check(w, "weight");
-                }
-                check(sampler.pdf(in.any(-1.5f, 1.5f), in.any(-3, 3)), "pdf");
-                FarField<3> far;
-                far_field(fibre, theta_i, {in.any(-1, 0), in.any(0, 1)}, far);
-                for (float x : far.eval(in.any(-1.5707f, 1.5707f), in.any(-7, 7)).value) check(x, "far");
-                FarSampler<3> far_sampler;
-                far_sampler.prepare(far);
-                const auto s =
-                    far_sampler.sample({in.uniform(), in.uniform(), in.uniform(), in.uniform(), in.uniform()});
-                check(s.pdf, "far pdf");
-                for (float w : s.weight) check(w, "far weight");
-                check(far_sampler.pdf(in.any(-1.5f, 1.5f), in.any(-3, 3)), "far pdf");
-            }
+            check_all(near.evaluate(vector()), "near");
+            check_all(near.keep(LobeMask(i)).evaluate(angles()), "kept");
+            if (k > 0) continue;
+            const FarField<3> far =
+                far_field(fibre, angles(), {in.any(-1, 0), in.any(0, 1)}, static_cast<FarQuality>(int(i % 3) - 1));
+            check_all(far.evaluate(angles()), "far");
+            check_all(far.evaluate(vector()), "far");
+            check_all(far.keep(LobeMask(i)).evaluate(angles()), "far, kept");
+            check_sample(far.sample(numbers()), "far sample");
         }
-        float query[4][8];
-        for (float(&of)[8] : query)
-            for (float& x : of) x = in.any(-1.5707f, 1.5707f);
-        Colour<3> each[8];
-        eval(fibre, 8, query[0], query[1], query[2], query[3], each);
-        for (const Colour<3>& at : each)
-            for (float x : at.value) check(x, "queries");
-        const Vector<float> a = {in.any(-1, 1), in.any(-1, 1), in.any(-1, 1)},
-                            b = {in.any(-1, 1), in.any(-1, 1), in.any(-1, 1)};
-        for (float x : eval(fibre, a, b, in.any(-1, 1)).value) check(x, "directions");
+        constexpr int count = 4;
+        Angles known[count], exits[count];
+        float h[count];
+        Evaluation<3> each[count];
+        for (int k = 0; k < count; ++k) known[k] = angles(), exits[k] = angles(), h[k] = in.any(-1, 1);
+        evaluate_batch(fibre, count, known, h, exits, each);
+        for (const Evaluation<3>& e : each) check_all(e, "batch");
     }
-    if (wanted) std::printf("%ld inputs, %ld values, %ld of them > 0, %ld bad\n", 93 * fibres, evaluated, bright, bad);
+    if (wanted) std::printf("%ld fibres, %ld values, %ld of them > 0, %ld bad\n", fibres, evaluated, bright, bad);
     CHECK(bad == 0);
     CHECK(usable_fibres > fibres / 4);
-    CHECK(unfolded > fibres / 64);
+    CHECK(made > fibres / 64);
     CHECK(bright > evaluated / 20);
+    CHECK(drawn > 4 * fibres);
 }

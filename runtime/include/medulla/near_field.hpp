@@ -172,7 +172,7 @@ struct NearField : detail::FieldBase<Channels> {
         if (!(this->known.cosine > 0)) return kept;
         float sum = 0;
         for (int k = 0; k < all_lobe_count; ++k) sum += mask >> k & 1u ? A[k][lanes - 1] : 0.0f;
-        const float inverse = sum > 0 ? 1 / sum : 0.0f;
+        const float inverse = sum > 1e-30f ? 1 / sum : 0.0f;  // of a lesser one the inverse may be infinite
         for (int k = 0; k < all_lobe_count; ++k)
             for (int c = 0; c < lanes; ++c)
                 kept.A[k][c] = mask >> k & 1u ? A[k][c] * (c < Channels ? 1.0f : inverse) : 0.0f;
@@ -336,7 +336,10 @@ MEDULLA_HOT void set_energies(const Fibre<Channels>& fibre, const Path<float>& p
     store_four(high * inverse, share + 4);
     for (int k = 0; k < all_lobe_count; ++k) hit.A[k][lanes - 1] = share[k];
     // Less than this in every channel cannot be seen beside 1.
-    if (!(lane(high, 0) + lane(low, 3) > negligible_energy)) hit.tables = nullptr;
+    if (lane(high, 0) + lane(low, 3) > negligible_energy) return;
+    hit.tables = nullptr;
+    for (int k = 3; k < 5; ++k)  // nor may it be drawn: there is no table to draw from
+        for (int c = 0; c < lanes; ++c) hit.A[k][c] = 0;
 }
 
 template <int Channels>

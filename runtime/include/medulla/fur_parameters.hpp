@@ -2,10 +2,13 @@
 // Rests on Yan et al. 2017, Tables 1 and 4; lengths are in fibre radii, angles in radians.
 #pragma once
 
+#include <cstdint>
+
 #include "medulla/config.hpp"
-#include "medulla/lanes.hpp"
+#include "medulla/detail/lanes.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
 
 /// Which reflectance R an interface has (docs/bcsdf.md, 'Fresnel').
 enum class Fresnel : int {
@@ -31,52 +34,27 @@ struct FurParameters {
     Fresnel fresnel = Fresnel::bravais;
 };
 
-/// The five lobes, in the order in which every array of lobes holds them.
-enum class Lobe : int { R = 0, TT = 1, TRT = 2, TTs = 3, TRTs = 4 };
-inline constexpr int lobe_count = 5;
-inline constexpr const char* lobe_names[lobe_count] = {"R", "TT", "TRT", "TTs", "TRTs"};
+/// The five lobes of the paper, in the order in which every array of lobes holds them, and behind them the residual
+/// one: what paths after TRT carry (docs/bcsdf.md, 'Residual lobe').
+enum class Lobe : int { R = 0, TT = 1, TRT = 2, TTs = 3, TRTs = 4, residual = 5 };
+inline constexpr int lobe_count = 5;      ///< of the paper
+inline constexpr int all_lobe_count = 6;  ///< with the residual one
+inline constexpr const char* lobe_names[all_lobe_count] = {"R", "TT", "TRT", "TTs", "TRTs", "residual"};
 
-enum class FurStatus {
-    ok,
-    no_azimuthal_table,     ///< usable: kappa > 0 and sigma_ms > 0, but the scattered lobes are absent
-    no_longitudinal_table,  ///< usable: the same, for want of a longitudinal table
-    bad_eta,                ///< this and all below: a parameter is outside its range, every lobe is 0
-    bad_kappa,
-    bad_alpha,
-    bad_roughness,
-    bad_layers,
-    bad_sigma,
-    bad_g,
-};
+/// A set of lobes: bits of lobe_bit.
+using LobeMask = std::uint32_t;
+MEDULLA_FN constexpr LobeMask lobe_bit(Lobe lobe) noexcept { return LobeMask(1) << static_cast<int>(lobe); }
+inline constexpr LobeMask all_lobes = 63;
 
-inline const char* describe(FurStatus status) noexcept {
-    switch (status) {
-        case FurStatus::ok:
-            return "ok";
-        case FurStatus::no_azimuthal_table:
-            return "the pack has no azimuthal table: scattered lobes are absent";
-        case FurStatus::no_longitudinal_table:
-            return "the pack lacks a longitudinal table: scattered lobes are absent";
-        case FurStatus::bad_eta:
-            return "eta is not in (1, 10]";
-        case FurStatus::bad_kappa:
-            return "kappa is not in [0, 1]";
-        case FurStatus::bad_alpha:
-            return "alpha is not in [-pi/2, pi/2]";
-        case FurStatus::bad_roughness:
-            return "beta_m or beta_n is not in [1e-4, 4] radians";
-        case FurStatus::bad_layers:
-            return "layers is not in [0, 1000]";
-        case FurStatus::bad_sigma:
-            return "sigma_ms, sigma_ma or sigma_ca is not in [0, 1e9]";
-        case FurStatus::bad_g:
-            return "g is not in (-1, 1)";
-    }
-    return "unknown status";
-}
-
-/// Whether a fibre of this status may be evaluated with at least its unscattered lobes.
-MEDULLA_FN constexpr bool usable(FurStatus status) noexcept { return status < FurStatus::bad_eta; }
+/// A parameter that is out of its range: bits of Fibre::out_of_range.
+enum class Parameter : std::uint32_t { eta, kappa, alpha, beta_m, beta_n, layers, sigma_ms, sigma_ma, sigma_ca, g };
+inline constexpr int parameter_count = 10;
+inline constexpr const char* parameter_names[parameter_count] = {"eta",    "kappa",    "alpha",    "beta_m",   "beta_n",
+                                                                 "layers", "sigma_ms", "sigma_ma", "sigma_ca", "g"};
+/// The range of each [same unit], as text for messages.
+inline constexpr const char* parameter_ranges[parameter_count] = {
+    "(1, 10]", "[0, 1]", "[-pi/2, pi/2]", "[1e-4, 4] radians", "[1e-4, 4] radians", "[0, 1000]", "[0, 1e9]", "[0, 1e9]",
+    "[0, 1e9]", "(-1, 1)"};
 
 /// A row of Table 4 as printed: degrees, one grey sigma_ca.
 struct FurPreset {
@@ -123,21 +101,55 @@ constexpr const FurPreset* find_preset(const char* name) noexcept {
     return nullptr;
 }
 
-/// Checks every parameter against its range.
-template <int Channels>
-MEDULLA_FN FurStatus check(const FurParameters<Channels>& p) noexcept {
-    using detail::within;
-    if (!within(p.eta, 10) || !(p.eta > 1)) return FurStatus::bad_eta;
-    if (!within(p.kappa, 1) || !(p.kappa >= 0)) return FurStatus::bad_kappa;
-    if (!within(p.alpha, float(pi / 2))) return FurStatus::bad_alpha;
-    const bool rough = within(p.beta_m, 4) && within(p.beta_n, 4) && p.beta_m >= 1e-4f && p.beta_n >= 1e-4f;
-    if (!rough) return FurStatus::bad_roughness;
-    if (!within(p.layers, 1000) || !(p.layers >= 0)) return FurStatus::bad_layers;
-    bool sigmas = within(p.sigma_ms, 1e9f) && p.sigma_ms >= 0 && within(p.sigma_ma, 1e9f) && p.sigma_ma >= 0;
-    for (int c = 0; c < Channels; ++c) sigmas = sigmas && within(p.sigma_ca[c], 1e9f) && p.sigma_ca[c] >= 0;
-    if (!sigmas) return FurStatus::bad_sigma;
-    if (!within(p.g, 1) || !(p.g > -1 && p.g < 1)) return FurStatus::bad_g;
-    return FurStatus::ok;
+namespace detail {
+
+/// x within [low, high], 0 <= low: compared as bits, so that a NaN is out of range under -ffast-math too.
+MEDULLA_HOT bool within(float x, float low, float high) noexcept {
+    return bits_of(x) - bits_of(low) <= bits_of(high) - bits_of(low) || (low == 0 && bits_of(x) == 0x80000000u);
+}
+inline constexpr float greatest_below_1 = 0.99999994f, least_above_1 = 1.0000001f;
+
+/// Calls visit(parameter, value, low, high) for each number.
+template <class Parameters, class Visit>
+MEDULLA_HOT void visit_parameters(Parameters& p, Visit&& visit) noexcept {
+    constexpr float quarter = float(pi / 2);
+    visit(Parameter::eta, p.eta, least_above_1, 10.0f);
+    visit(Parameter::kappa, p.kappa, 0.0f, 1.0f);
+    visit(Parameter::alpha, p.alpha, -quarter, quarter);
+    visit(Parameter::beta_m, p.beta_m, 1e-4f, 4.0f);
+    visit(Parameter::beta_n, p.beta_n, 1e-4f, 4.0f);
+    visit(Parameter::layers, p.layers, 0.0f, 1000.0f);
+    visit(Parameter::sigma_ms, p.sigma_ms, 0.0f, 1e9f);
+    visit(Parameter::sigma_ma, p.sigma_ma, 0.0f, 1e9f);
+    for (auto& sigma : p.sigma_ca) visit(Parameter::sigma_ca, sigma, 0.0f, 1e9f);
+    visit(Parameter::g, p.g, -greatest_below_1, greatest_below_1);
 }
 
+}  // namespace detail
+
+/// The parameters that are out of their ranges: bit i for Parameter i.
+template <int Channels>
+MEDULLA_FN std::uint32_t out_of_range(const FurParameters<Channels>& p) noexcept {
+    std::uint32_t bits = 0;
+    detail::visit_parameters(p, [&](Parameter which, float value, float low, float high) {
+        const bool inside = low < 0 ? detail::within(value, high) : detail::within(value, low, high);
+        bits |= inside ? 0u : 1u << static_cast<std::uint32_t>(which);
+    });
+    return bits;
+}
+
+/// Every parameter brought into its range; a NaN becomes the range's lower end, or 0 where the range goes below it.
+template <int Channels>
+MEDULLA_FN FurParameters<Channels> clamped(FurParameters<Channels> p) noexcept {
+    detail::visit_parameters(p, [](Parameter, float& value, float low, float high) {
+        const bool number = detail::within(value, 3.4028235e38f) || detail::bits_of(value) << 1 == 0xff000000u;
+        if (!number)
+            value = low < 0 ? 0.0f : low;
+        else
+            value = value < low ? low : (value > high ? high : value);
+    });
+    return p;
+}
+
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -6,11 +6,12 @@
 #include <cmath>
 #include <cstdint>
 
-#include "medulla/blocks.hpp"
-#include "medulla/held_integral.hpp"
+#include "medulla/detail/blocks.hpp"
+#include "medulla/detail/clamped_integral.hpp"
 #include "medulla/pack.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
 
 /// Where in a table's parameter space: only the axes that the table has are read.
 struct LobeQuery {
@@ -136,24 +137,24 @@ MEDULLA_FN float inverse_integral(const TableView& table, const float* weight) n
 }
 
 /// 1 / (integral over the exit direction of the contracted lobe held to >= 0). Reads the whole exit factor.
-MEDULLA_FN float inverse_held_integral(const TableView& table, const float* weight) noexcept {
+MEDULLA_FN float inverse_clamped_integral(const TableView& table, const float* weight) noexcept {
     const float inverse = inverse_integral(table, weight);
-    return inverse / (1 + detail::dips(table, weight) * inverse);
+    return inverse / (1 + detail::undershoot(table, weight) * inverse);
 }
 
 /// Integral of lobe() over the exit direction; 0 where there is no lobe.
-MEDULLA_FN float held_integral(const TableView& table, const Contraction& contraction) noexcept {
-    const float inverse = inverse_held_integral(table, contraction.weight);
+MEDULLA_FN float clamped_integral(const TableView& table, const Contraction& contraction) noexcept {
+    const float inverse = inverse_clamped_integral(table, contraction.weight);
     return inverse > 0 ? contraction.inverse_integral / inverse : 0.0f;
 }
 
 /// Makes lobe() integrate to 1 to float precision.
-MEDULLA_FN void hold_energy(const TableView& table, Contraction& contraction) noexcept {
-    contraction.inverse_integral = inverse_held_integral(table, contraction.weight);
+MEDULLA_FN void normalise_clamped(const TableView& table, Contraction& contraction) noexcept {
+    contraction.inverse_integral = inverse_clamped_integral(table, contraction.weight);
 }
 
 /// Contracts the parameter axes of `table` at `query`; values outside an axis are held to its ends. signed_lobe()
-/// integrates to 1, lobe() to that and what its dips hold: the plain twin of contract(), four to five times as fast.
+/// integrates to 1, lobe() to that and what its undershoot hold: the plain twin of contract(), four to five times as fast.
 MEDULLA_FN Contraction contract_signed(const TableView& table, const LobeQuery& query) noexcept {
     Contraction result;
     start_contraction(table, result.weight);
@@ -168,7 +169,7 @@ MEDULLA_FN Contraction contract_signed(const TableView& table, const LobeQuery& 
 /// The same so that lobe() integrates to 1, to float precision.
 MEDULLA_FN Contraction contract(const TableView& table, const LobeQuery& query) noexcept {
     Contraction result = contract_signed(table, query);
-    if (table.has_exit()) hold_energy(table, result);
+    if (table.has_exit()) normalise_clamped(table, result);
     return result;
 }
 
@@ -182,8 +183,8 @@ MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contract
     return signed_lobe(table, contraction, exit_point(table, y));
 }
 
-/// Density per radian, >= 0, of integral 1 where `contract` made the contraction: a signed low-rank sum dips below 0
-/// where the lobe is nearly 0, and holding it there lowers the error (docs/accuracy.md gives how far it dips).
+/// Density per radian, >= 0, of integral 1 where `contract` made the contraction: a signed low-rank sum undershoot below 0
+/// where the lobe is nearly 0, and holding it there lowers the error (docs/accuracy.md gives how far it undershoot).
 MEDULLA_FN float lobe(const TableView& table, const Contraction& contraction, float y) noexcept {
     const float value = signed_lobe(table, contraction, y);
     return value < 0 ? 0.0f : value;  // a NaN stays one
@@ -257,4 +258,5 @@ MEDULLA_FN float longitudinal(const PackView& pack, Side which, float sigma, flo
     return lobe(table, contract(table, query), side * theta_r);
 }
 
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

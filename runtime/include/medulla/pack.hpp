@@ -10,6 +10,7 @@
 #include "medulla/config.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
 
 inline constexpr char pack_magic[8] = {'F', 'U', 'R', 'P', 'A', 'C', 'K', '\n'};
 inline constexpr std::uint32_t pack_version = 4;
@@ -360,4 +361,5 @@ inline OpenResult open_pack(const void* data, std::size_t size) noexcept {
     return result;
 }
 
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -1,18 +1,19 @@
-// The integral of what a contracted lobe is below 0: a signed low-rank sum dips where the lobe is nearly 0, and holding
-// it there adds what it dips. Rests on blocks.hpp.
+// The integral of what a contracted lobe is below 0: a signed low-rank sum undershoot where the lobe is nearly 0, and holding
+// it there adds what it undershoot. Rests on blocks.hpp.
 #pragma once
 
 #include <cmath>
 
-#include "medulla/blocks.hpp"
+#include "medulla/detail/blocks.hpp"
 
 namespace medulla {
-
+inline namespace MEDULLA_TARGET {
 namespace detail {
+
 
 /// Integral of max(0, -f) over one span; f the spline with these four coefficients there. Between its ends and where it
 /// is stationary the cubic is monotone: a root is bisected, and Simpson's rule is exact.
-MEDULLA_FN float dip(const AxisView<float>& axis, std::uint32_t span, const float* c) noexcept {
+MEDULLA_FN float span_undershoot(const AxisView<float>& axis, std::uint32_t span, const float* c) noexcept {
     if (c[0] >= 0 && c[1] >= 0 && c[2] >= 0 && c[3] >= 0) return 0;  // then f is too
     const float low = axis.breakpoint(std::int32_t(span)), width = axis.breakpoint(std::int32_t(span) + 1) - low;
     float at[4];  // f at thirds of the span, which make its cubic by Newton's forward differences
@@ -77,18 +78,18 @@ MEDULLA_FN void exit_coefficients(const TableView& view, const float* weight, Pu
 /// Integral over both halves of the axis of what lies below 0. @param at at(j, k): coefficient j for y >= 0 (k = 0) and
 /// y < 0 (k = 1)
 template <class At>
-MEDULLA_FN float dips(const AxisView<float>& axis, At&& at) noexcept {
+MEDULLA_FN float undershoot(const AxisView<float>& axis, At&& at) noexcept {
     float sum = 0;
     for (std::uint32_t span = 0; span < axis.spans; ++span)
         for (std::uint32_t k = 0; k < 2; ++k) {
             const float c[4] = {at(span, k), at(span + 1, k), at(span + 2, k), at(span + 3, k)};
-            sum += dip(axis, span, c);
+            sum += span_undershoot(axis, span, c);
         }
     return sum;
 }
 
 /// The same of a table's lobe with these weights, from the whole exit factor, to float precision.
-MEDULLA_FN float dips(const TableView& table, const float* weight) noexcept {
+MEDULLA_FN float undershoot(const TableView& table, const float* weight) noexcept {
     const AxisView<float> axis = table.axis(table.parameter_axes());
     // Of either half the four coefficients of the rows that came last, behind the three before them.
     float c[2][7] = {}, sum = 0;
@@ -100,13 +101,14 @@ MEDULLA_FN float dips(const TableView& table, const float* weight) noexcept {
             bool below = false;
             for (const float x : c[k]) below |= x < 0;
             for (std::uint32_t span = spans; below && span <= row; ++span)
-                sum += dip(axis, span, c[k] + (span + 3 - row));
+                sum += span_undershoot(axis, span, c[k] + (span + 3 - row));
         }
         last = row, spans = row + 1;
     });
     return sum;
 }
 
-}  // namespace detail
 
+}  // namespace detail
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -1,6 +1,6 @@
-// Four floats side by side with the operators of one, so that the same formula runs for one offset or for four.
-// Rests on SSE2, which every x86-64 has; elsewhere, or with MEDULLA_NO_SIMD defined, plain arrays that a compiler may
-// or may not join.
+// The one vector type: four floats with the operators of one, so that the same formula runs for one offset or for four.
+// SSE2 on x86-64, NEON on AArch64; elsewhere, on GPUs, or with MEDULLA_NO_SIMD defined, an array of four. No struct that
+// a user keeps holds one: their layout is the same everywhere.
 #pragma once
 
 #include <cmath>
@@ -9,23 +9,28 @@
 
 #include "medulla/config.hpp"
 
-#if defined(__SSE2__) && !defined(MEDULLA_NO_SIMD) && !defined(__CUDA_ARCH__) && !defined(__HIP_DEVICE_COMPILE__)
+#if !defined(MEDULLA_NO_SIMD) && !defined(__CUDA_ARCH__) && !defined(__HIP_DEVICE_COMPILE__)
+#if defined(__SSE2__) || defined(_M_X64)
 #define MEDULLA_SSE2 1
 #include <emmintrin.h>
 #if defined(__AVX2__)
 #include <immintrin.h>
 #endif
-// What may be compiled for AVX2 with fused products beside what the renderer is built for, and taken where the
-// processor has them.
+// What is compiled a second time for AVX2 with fused products, and run where the processor has them.
 #if defined(__GNUC__) && !defined(__CUDACC__) && !defined(__HIPCC__)
-#define MEDULLA_WIDE __attribute__((target("avx2,fma")))
+#define MEDULLA_WIDE 1
 #include <immintrin.h>
+#endif
+#elif defined(__ARM_NEON) && defined(__aarch64__)
+#define MEDULLA_NEON 1
+#include <arm_neon.h>
 #endif
 #endif
 
 namespace medulla {
-
+inline namespace MEDULLA_TARGET {
 namespace detail {
+
 
 MEDULLA_FN std::uint32_t bits_of(float x) noexcept {
     std::uint32_t bits;
@@ -34,8 +39,11 @@ MEDULLA_FN std::uint32_t bits_of(float x) noexcept {
 }
 /// |x| <= limit, false for a NaN also under -ffast-math: compared as bits, limit > 0.
 MEDULLA_FN bool within(float x, float limit) noexcept { return (bits_of(x) & 0x7fffffffu) <= bits_of(limit); }
+/// The whole number nearest to a; what is too large to have a fraction, and a NaN, stays as it is.
+MEDULLA_FN float nearest_integer(float a) noexcept {
+    return within(a, 8388608.0f) ? float(std::int32_t(a + (a < 0 ? -0.5f : 0.5f))) : a;
+}
 
-}  // namespace detail
 
 #if defined(MEDULLA_SSE2)
 struct Four {
@@ -57,14 +65,12 @@ struct FourMask {
 inline FourMask operator<(Four a, Four b) noexcept { return {_mm_cmplt_ps(a.v, b.v)}; }
 inline FourMask operator>(Four a, Four b) noexcept { return {_mm_cmpgt_ps(a.v, b.v)}; }
 inline FourMask operator&(FourMask a, FourMask b) noexcept { return {_mm_and_ps(a.v, b.v)}; }
-namespace detail {
 /// The same, lane by lane.
 inline FourMask within(Four a, float limit) noexcept {
     const __m128i bits = _mm_and_si128(_mm_castps_si128(a.v), _mm_set1_epi32(0x7fffffff));
     const __m128i end = _mm_add_epi32(_mm_castps_si128(_mm_set1_ps(limit)), _mm_set1_epi32(1));
     return {_mm_castsi128_ps(_mm_cmplt_epi32(bits, end))};
 }
-}  // namespace detail
 inline Four choose(FourMask mask, Four yes, Four no) noexcept {
     return Four(_mm_or_ps(_mm_and_ps(mask.v, yes.v), _mm_andnot_ps(mask.v, no.v)));
 }
@@ -83,18 +89,25 @@ inline Four with_sign(Four x, Four y) noexcept {
     const __m128 sign = _mm_set1_ps(-0.0f);
     return Four(_mm_or_ps(_mm_andnot_ps(sign, x.v), _mm_and_ps(sign, y.v)));
 }
-inline Four nearest_integer(Four a) noexcept { return Four(_mm_cvtepi32_ps(_mm_cvtps_epi32(a.v))); }
+/// The whole number nearest to a, |a| < 2^31, in any rounding mode: half a unit is added and the rest cut off.
+inline Four nearest_integer(Four a) noexcept {
+    const __m128 half = _mm_or_ps(_mm_and_ps(a.v, _mm_set1_ps(-0.0f)), _mm_set1_ps(0.5f));
+    return Four(_mm_cvtepi32_ps(_mm_cvttps_epi32(_mm_add_ps(a.v, half))));
+}
 /// 2^k for whole k, -126 <= k <= 127.
 inline Four power_of_two(Four k) noexcept {
-    const __m128i n = _mm_cvtps_epi32(k.v);
+    const __m128i n = _mm_cvttps_epi32(k.v);
     return Four(_mm_castsi128_ps(_mm_slli_epi32(_mm_add_epi32(n, _mm_set1_epi32(127)), 23)));
 }
 inline bool any(FourMask mask) noexcept { return _mm_movemask_ps(mask.v) != 0; }
+/// How many lanes are set.
+inline std::uint32_t count_of(FourMask mask) noexcept {
+    const auto bits = unsigned(_mm_movemask_ps(mask.v));
+    return std::uint32_t(0x4332322132212110u >> 4 * bits & 15u);
+}
 inline Four four_at(const float* x) noexcept { return Four(_mm_loadu_ps(x)); }
 /// @param x aligned to 16 bytes
 inline Four aligned_four_at(const float* x) noexcept { return Four(_mm_load_ps(x)); }
-/// The whole part of lane 0, below 2^31.
-inline std::int32_t whole(Four a) noexcept { return _mm_cvttss_si32(a.v); }
 inline void store_four(Four a, float* x) noexcept { _mm_storeu_ps(x, a.v); }
 /// Whole parts of numbers below 2^31.
 inline void store_whole(Four a, std::int32_t* n) noexcept {
@@ -107,9 +120,6 @@ template <int i>
 inline Four spread(Four a) noexcept {
     return Four(_mm_shuffle_ps(a.v, a.v, i * 0x55));
 }
-/// Lanes 0 0 1 1 and 2 2 3 3.
-inline Four lower_twice(Four a) noexcept { return Four(_mm_unpacklo_ps(a.v, a.v)); }
-inline Four upper_twice(Four a) noexcept { return Four(_mm_unpackhi_ps(a.v, a.v)); }
 /// Rows become columns.
 inline void transpose(Four& a, Four& b, Four& c, Four& d) noexcept { _MM_TRANSPOSE4_PS(a.v, b.v, c.v, d.v); }
 inline float lane(Four a, int i) noexcept {
@@ -120,6 +130,76 @@ inline float lane(Four a, int i) noexcept {
 inline float sum_of(Four a) noexcept {
     const __m128 y = _mm_add_ps(a.v, _mm_movehl_ps(a.v, a.v));
     return _mm_cvtss_f32(_mm_add_ss(y, _mm_shuffle_ps(y, y, 1)));
+}
+#elif defined(MEDULLA_NEON)
+struct Four {
+    float32x4_t v;
+    Four() noexcept : v(vdupq_n_f32(0)) {}
+    Four(float x) noexcept : v(vdupq_n_f32(x)) {}  // implicit: a number is four of itself
+    explicit Four(float32x4_t x) noexcept : v(x) {}
+    Four(float a, float b, float c, float d) noexcept : v{a, b, c, d} {}
+};
+inline Four operator+(Four a, Four b) noexcept { return Four(vaddq_f32(a.v, b.v)); }
+inline Four operator-(Four a, Four b) noexcept { return Four(vsubq_f32(a.v, b.v)); }
+inline Four operator*(Four a, Four b) noexcept { return Four(vmulq_f32(a.v, b.v)); }
+inline Four operator/(Four a, Four b) noexcept { return Four(vdivq_f32(a.v, b.v)); }
+inline Four operator-(Four a) noexcept { return Four(vnegq_f32(a.v)); }
+struct FourMask {
+    uint32x4_t v;
+};
+inline FourMask operator<(Four a, Four b) noexcept { return {vcltq_f32(a.v, b.v)}; }
+inline FourMask operator>(Four a, Four b) noexcept { return {vcgtq_f32(a.v, b.v)}; }
+inline FourMask operator&(FourMask a, FourMask b) noexcept { return {vandq_u32(a.v, b.v)}; }
+inline FourMask within(Four a, float limit) noexcept {
+    return {vcleq_u32(vandq_u32(vreinterpretq_u32_f32(a.v), vdupq_n_u32(0x7fffffffu)), vdupq_n_u32(bits_of(limit)))};
+}
+inline Four choose(FourMask mask, Four yes, Four no) noexcept { return Four(vbslq_f32(mask.v, yes.v, no.v)); }
+inline Four greater(Four a, Four b) noexcept { return choose(a > b, a, b); }
+inline Four lesser(Four a, Four b) noexcept { return choose(a < b, a, b); }
+inline Four only_where(FourMask mask, Four a) noexcept {
+    return Four(vreinterpretq_f32_u32(vandq_u32(mask.v, vreinterpretq_u32_f32(a.v))));
+}
+inline Four zero_where(FourMask mask, Four a) noexcept {
+    return Four(vreinterpretq_f32_u32(vbicq_u32(vreinterpretq_u32_f32(a.v), mask.v)));
+}
+inline Four square_root(Four a) noexcept { return Four(vsqrtq_f32(a.v)); }
+inline Four magnitude(Four a) noexcept { return Four(vabsq_f32(a.v)); }
+inline Four with_sign(Four x, Four y) noexcept { return Four(vbslq_f32(vdupq_n_u32(0x80000000u), y.v, x.v)); }
+inline Four nearest_integer(Four a) noexcept {
+    return Four(vcvtq_f32_s32(vcvtq_s32_f32(vaddq_f32(a.v, with_sign(Four(0.5f), a).v))));
+}
+inline Four power_of_two(Four k) noexcept {
+    return Four(vreinterpretq_f32_s32(vshlq_n_s32(vaddq_s32(vcvtq_s32_f32(k.v), vdupq_n_s32(127)), 23)));
+}
+inline bool any(FourMask mask) noexcept { return vmaxvq_u32(mask.v) != 0; }
+inline std::uint32_t count_of(FourMask mask) noexcept { return vaddvq_u32(vshrq_n_u32(mask.v, 31)); }
+inline Four four_at(const float* x) noexcept { return Four(vld1q_f32(x)); }
+inline Four aligned_four_at(const float* x) noexcept { return Four(vld1q_f32(x)); }
+inline void store_four(Four a, float* x) noexcept { vst1q_f32(x, a.v); }
+inline void store_whole(Four a, std::int32_t* n) noexcept { vst1q_s32(n, vcvtq_s32_f32(a.v)); }
+inline unsigned below_zero(Four a) noexcept {
+    const uint32x4_t bit = {1, 2, 4, 8};
+    return vaddvq_u32(vandq_u32(vcltq_f32(a.v, vdupq_n_f32(0)), bit));
+}
+template <int i>
+inline Four spread(Four a) noexcept {
+    return Four(vdupq_laneq_f32(a.v, i));
+}
+inline void transpose(Four& a, Four& b, Four& c, Four& d) noexcept {
+    const float32x4x2_t x = vtrnq_f32(a.v, b.v), y = vtrnq_f32(c.v, d.v);
+    a.v = vcombine_f32(vget_low_f32(x.val[0]), vget_low_f32(y.val[0]));
+    b.v = vcombine_f32(vget_low_f32(x.val[1]), vget_low_f32(y.val[1]));
+    c.v = vcombine_f32(vget_high_f32(x.val[0]), vget_high_f32(y.val[0]));
+    d.v = vcombine_f32(vget_high_f32(x.val[1]), vget_high_f32(y.val[1]));
+}
+inline float lane(Four a, int i) noexcept {
+    float x[4];
+    vst1q_f32(x, a.v);
+    return x[i];
+}
+inline float sum_of(Four a) noexcept {
+    const float32x2_t y = vadd_f32(vget_low_f32(a.v), vget_high_f32(a.v));
+    return vget_lane_f32(y, 0) + vget_lane_f32(y, 1);
 }
 #else
 struct Four {
@@ -155,11 +235,9 @@ MEDULLA_FN FourMask operator<(Four a, Four b) noexcept {
     return {{a.v[0] < b.v[0], a.v[1] < b.v[1], a.v[2] < b.v[2], a.v[3] < b.v[3]}};
 }
 MEDULLA_FN FourMask operator>(Four a, Four b) noexcept { return b < a; }
-namespace detail {
 MEDULLA_FN FourMask within(Four a, float limit) noexcept {
     return {{within(a.v[0], limit), within(a.v[1], limit), within(a.v[2], limit), within(a.v[3], limit)}};
 }
-}  // namespace detail
 MEDULLA_FN FourMask operator&(FourMask a, FourMask b) noexcept {
     return {{a.v[0] && b.v[0], a.v[1] && b.v[1], a.v[2] && b.v[2], a.v[3] && b.v[3]}};
 }
@@ -182,11 +260,14 @@ MEDULLA_FN Four magnitude(Four a) noexcept {
 /// |x| with the sign of y.
 MEDULLA_FN Four with_sign(Four x, Four y) noexcept { return choose(y < Four(0.0f), -magnitude(x), magnitude(x)); }
 MEDULLA_FN Four nearest_integer(Four a) noexcept {
-    return each([&](int i) { return float(std::int32_t(a.v[i] + (a.v[i] < 0 ? -0.5f : 0.5f))); });
+    return each([&](int i) { return nearest_integer(a.v[i]); });
 }
 /// 2^k for whole k, -126 <= k <= 127.
 MEDULLA_FN Four power_of_two(Four k) noexcept {
     return each([&](int i) { return std::ldexp(1.0f, int(k.v[i])); });
+}
+MEDULLA_FN std::uint32_t count_of(FourMask mask) noexcept {
+    return std::uint32_t(mask.v[0]) + std::uint32_t(mask.v[1]) + std::uint32_t(mask.v[2]) + std::uint32_t(mask.v[3]);
 }
 MEDULLA_FN bool any(FourMask mask) noexcept { return mask.v[0] || mask.v[1] || mask.v[2] || mask.v[3]; }
 MEDULLA_FN Four four_at(const float* x) noexcept { return Four(x[0], x[1], x[2], x[3]); }
@@ -207,9 +288,6 @@ template <int i>
 MEDULLA_FN Four spread(Four a) noexcept {
     return Four(a.v[i]);
 }
-/// Lanes 0 0 1 1 and 2 2 3 3.
-MEDULLA_FN Four lower_twice(Four a) noexcept { return Four(a.v[0], a.v[0], a.v[1], a.v[1]); }
-MEDULLA_FN Four upper_twice(Four a) noexcept { return Four(a.v[2], a.v[2], a.v[3], a.v[3]); }
 /// Rows become columns.
 MEDULLA_FN void transpose(Four& a, Four& b, Four& c, Four& d) noexcept {
     const Four x = a, y = b, z = c, w = d;
@@ -218,13 +296,6 @@ MEDULLA_FN void transpose(Four& a, Four& b, Four& c, Four& d) noexcept {
 }
 MEDULLA_FN float lane(Four a, int i) noexcept { return a.v[i]; }
 MEDULLA_FN float sum_of(Four a) noexcept { return (a.v[0] + a.v[2]) + (a.v[1] + a.v[3]); }
-#endif
-
-/// One number, kept as a vector processor wants it for products with four others: in every lane.
-#if defined(MEDULLA_SSE2)
-using Same = Four;
-#else
-using Same = float;
 #endif
 
 /// A constant as one number or as four.
@@ -244,7 +315,6 @@ MEDULLA_FN T choose(bool condition, T yes, T no) noexcept {
 }
 MEDULLA_FN float greater(float a, float b) noexcept { return a > b ? a : b; }
 MEDULLA_FN float lesser(float a, float b) noexcept { return a < b ? a : b; }
-MEDULLA_FN std::int32_t whole(float a) noexcept { return std::int32_t(a); }
 MEDULLA_FN float zero_where(bool condition, float a) noexcept { return condition ? 0.0f : a; }
 template <class T>
 MEDULLA_FN T square_root(T a) noexcept {
@@ -262,68 +332,34 @@ MEDULLA_FN T nearest_integer(T a) noexcept {
 }
 MEDULLA_FN float magnitude(float a) noexcept { return a < 0 ? -a : a; }
 MEDULLA_FN float with_sign(float x, float y) noexcept { return y < 0 ? -magnitude(x) : magnitude(x); }
-#if defined(MEDULLA_SSE2)
-// In a vector's lowest lane, since a way through the integer registers takes twice as long.
-inline float nearest_integer(float a) noexcept { return _mm_cvtss_f32(nearest_integer(Four(a)).v); }
-inline float power_of_two(float k) noexcept { return _mm_cvtss_f32(power_of_two(Four(k)).v); }
-#else
-MEDULLA_FN float nearest_integer(float a) noexcept { return float(std::int32_t(a + (a < 0 ? -0.5f : 0.5f))); }
 MEDULLA_FN float power_of_two(float k) noexcept {
-    const std::int32_t bits = (std::int32_t(k) + 127) * 8388608;  // 2^23
+    const std::uint32_t bits = std::uint32_t(std::int32_t(k) + 127) << 23;
     float x;
     std::memcpy(&x, &bits, sizeof x);
     return x;
 }
-#endif
 MEDULLA_FN float lane(float a, int) noexcept { return a; }
 MEDULLA_FN float sum_of(float a) noexcept { return a; }
 
-#if defined(MEDULLA_WIDE)
-/// Whether what is marked MEDULLA_WIDE can run.
-inline bool has_wide() noexcept {
-#if defined(__AVX2__) && defined(__FMA__)
-    return true;
-#else
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#endif
-}
-namespace detail {
+/// Runs f(), compiled twice: for what the renderer is built for and, taken where the processor has them, for AVX2 with
+/// fused products. The compiler may fuse there, so the two differ by rounding.
+#if defined(MEDULLA_WIDE) && !defined(__FMA__)
 template <class F>
-__attribute__((target("avx2"), flatten)) void run_on_avx2(const F& f) noexcept {
-    f();
+__attribute__((target("avx2,fma"), flatten)) auto run_on_fma(const F& f) noexcept {
+    return f();
 }
 template <class F>
-__attribute__((target("avx2,fma"), flatten)) void run_on_fma(const F& f) noexcept {
-    f();
-}
-}  // namespace detail
-/// f(), compiled twice: for what the renderer is built for and, taken where the processor has it, for AVX2. For work of
-/// microseconds, not for one number.
-template <class F>
-void run_widest(const F& f) noexcept {
-#if !defined(__AVX2__)
-    if (has_wide()) return detail::run_on_avx2(f);
-#endif
-    f();
-}
-/// The same with FMA: what is MEDULLA_WIDE is inlined, and a compiler that fuses products may, and so round less often.
-template <class F>
-void run_fused(const F& f) noexcept {
-#if !defined(__FMA__)
-    if (has_wide()) return detail::run_on_fma(f);
-#endif
-    f();
+MEDULLA_FN auto run_fused(const F& f) noexcept {
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return run_on_fma(f);
+    return f();
 }
 #else
-/// f(), as the renderer is built.
 template <class F>
-MEDULLA_FN void run_widest(const F& f) noexcept {
-    f();
-}
-template <class F>
-MEDULLA_FN void run_fused(const F& f) noexcept {
-    f();
+MEDULLA_FN auto run_fused(const F& f) noexcept {
+    return f();
 }
 #endif
 
+}  // namespace detail
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -7,9 +7,11 @@
 
 #include "medulla/config.hpp"
 #include "medulla/fur_parameters.hpp"
-#include "medulla/real_math.hpp"
+#include "medulla/detail/elementary.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
+namespace detail {
 
 /// What the inclination theta_i decides for a whole cross-section.
 template <class T>
@@ -48,7 +50,7 @@ struct Path {
 
 /// F_1 = mean over polarisations of R + (1-R)^2 R / (1-R^2) = 2R / (1+R), F = l F_1 / (1 + (l-1) F_1) (Eq. 13).
 /// Differences are expanded so that n -> 1 and cos_i -> 0 lose no digits (docs/bcsdf.md, 'Fresnel').
-/// T is S, or several S abreast; I is either.
+/// T is S, or several S side by side; I is either.
 /// @param index_excess n^2 - 1  @param cos_i cosine of incidence
 /// @param x sqrt(index_excess + cos_i^2) = n times the cosine of refraction
 template <class T, class S, class I>
@@ -70,17 +72,17 @@ MEDULLA_FN Cuticle<T> cuticle(S layers, I index_excess, T cos_i, T x) noexcept {
     return {F1 * whole, T1 * whole};
 }
 
-/// @param at of all, or of each of several rays abreast
+/// @param at of all, or of each of several rays side by side
 /// @param cos_i cos gamma_i = sqrt(1 - h^2), given beside h because the caller often has it without cancellation
 template <class T, class S, class I>
-MEDULLA_FN Path<T> trace(const Inclination<I>& at, S kappa, S layers, T h, T cos_i) noexcept {
+MEDULLA_HOT Path<T> trace(const Inclination<I>& at, S kappa, S layers, T h, T cos_i) noexcept {
     Path<T> path;
     const T x = square_root(T(at.index_excess) + cos_i * cos_i), zero = T(S(0));
     const T sin_t = h * T(at.inverse_index), cos_t = x * T(at.inverse_index);
     path.h_inside = sin_t;
     const T sines[2] = {h, sin_t}, cosines[2] = {cos_i, cos_t};
     T gamma[2];
-    real_math::angles(sines, cosines, gamma);
+    angles(sines, cosines, gamma);
     path.gamma_i = gamma[0], path.gamma_t = gamma[1];
     const T s2 = (T(kappa) - sin_t) * (T(kappa) + sin_t);
     const auto inside = s2 > zero;
@@ -117,7 +119,7 @@ struct Absorption {
     T T_b[Channels];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
 };
 
-/// @param inverse_cos_t of one inclination or of several abreast
+/// @param inverse_cos_t of one inclination or of several side by side
 /// @param tabled the tables know what the medulla absorbs of scattered light: T_b leaves it out
 template <int Channels, class S, class T>
 MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, S>& p, T inverse_cos_t,
@@ -130,37 +132,52 @@ MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, S>& 
         a.cortex[c] = T(p.sigma_ca[c]) * inverse_cos_t;
         a.T_b[c] = -(medulla + T(S(1) - p.kappa) * a.cortex[c]);
     }
-    real_math::exponentials(a.T_b);
+    exponentials(a.T_b);
     return a;
 }
 
-/// Energies A of the five lobes, Eqs. 13, 14, 20; the scattered ones include E = 1 - exp(-2 s_m sigma_ms / cos
-/// theta_t), the energy of C^N, so that every lobe's azimuthal integral is its A.
+/// Energies A of the five lobes, Eqs. 13, 14, 20, and of the residual one. The scattered ones include E = 1 - exp(-2 s_m
+/// sigma_ms / cos theta_t), the energy of C^N, so that every lobe's azimuthal integral is its A.
+///
+/// Residual: of a crossing that light enters with energy e, s e leaves scattered and x e reaches the cuticle, where (1 -
+/// F) of it leaves and F starts the next. The third crossing begins with (1 - F) F^2 x^2; the sum over it and all later
+/// ones is (1 - F) F^2 x^2 (s + (1 - F) x) / (1 - F x). Without absorption s + x = 1 and all six add up to 1.
 template <int Channels, class T = float>
 struct Energies {
-    T A[lobe_count][Channels];
+    T A[all_lobe_count][Channels];
 };
 
+/// @param survival share of the scattered light that the medulla's absorption leaves, where tables know it, else 1
 template <int Channels, class T, class S>
-MEDULLA_FN Energies<Channels, T> energies(const Path<T>& path, const Absorption<Channels, S>& a,
-                                          bool scattered) noexcept {
+MEDULLA_HOT Energies<Channels, T> energies(const Path<T>& path, const Absorption<Channels, S>& a, bool scattered,
+                                           T survival = T(S(1))) noexcept {
     Energies<Channels, T> e;
+    const T one = T(S(1)), zero = T(S(0));
     const T F = path.cuticle.F, passed = path.cuticle.T_, depth = path.s_m * T(S(2) * a.medulla_scattering);
     T left[Channels + 2];  // after half-lengths of cortex, of medulla, and a chord's scattering alone
     for (int c = 0; c < Channels; ++c) left[c] = -path.s_c * T(a.cortex[c]);
     left[Channels] = -path.s_m * T(a.medulla_extinction), left[Channels + 1] = -depth;
-    real_math::exponentials(left);
-    const T m = left[Channels], E = scattered ? real_math::absorbed(depth, left[Channels + 1]) : T(S(0));
+    T crossing[Channels];  // optical length of a whole crossing
+    for (int c = 0; c < Channels; ++c) crossing[c] = T(S(-2)) * (left[c] + left[Channels]);
+    exponentials(left);
+    const T m = left[Channels], E = scattered ? absorbed(depth, left[Channels + 1]) * survival : zero;
+    const T third = passed * F * F;
     for (int c = 0; c < Channels; ++c) {
         const T q = left[c], through = (q * m) * (q * m);
-        const T s = passed * q * T(a.T_b[c]) * E;
+        const T share = q * T(a.T_b[c]) * E, s = passed * share;
         e.A[0][c] = F;
         e.A[1][c] = passed * passed * through;
         e.A[2][c] = e.A[1][c] * F * through;
         e.A[3][c] = s;
         e.A[4][c] = s * F * through;
+        // 1 - F x = (1 - F) + F (1 - x), which is 0 where all is reflected outside and nothing enters.
+        const T stays = passed + F * absorbed(crossing[c], through);
+        const auto some = stays > zero;
+        e.A[5][c] = third * through * through * choose(some, (share + passed * through) / choose(some, stays, one), zero);
     }
     return e;
 }
 
+}  // namespace detail
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -5,6 +5,8 @@
 #include "medulla/config.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
+namespace detail {
 
 inline constexpr int gauss_rules = 4;
 
@@ -45,4 +47,6 @@ MEDULLA_FN GaussRule gauss_rule(int index) noexcept {
     }
 }
 
+}  // namespace detail
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -5,11 +5,11 @@
 #include <cmath>
 
 #include "medulla/config.hpp"
-#include "medulla/lanes.hpp"
+#include "medulla/detail/lanes.hpp"
 
 namespace medulla {
-namespace real_math {
-
+inline namespace MEDULLA_TARGET {
+namespace detail {
 template <class T>
 struct SineCosine {
     T sine, cosine;
@@ -21,7 +21,7 @@ namespace polynomial {
 /// x = n log 2 + r, |r| <= log(2) / 2; degree 6 in r, by pairs of terms, which wait less for one another.
 template <class T>
 MEDULLA_FN T exponential(T x) noexcept {
-    const T y = greater(x, T(-87.0f)), k = nearest_integer(y * T(1.44269504f));
+    const T y = greater(T(-87.0f), x), k = nearest_integer(y * T(1.44269504f));
     const T r = (y - k * T(0.693359375f)) + k * T(2.12194440e-4f), r2 = r * r;
     const T p = (T(1.0f) + r) + r2 * ((T(0.5f) + r * T(1.6666667e-1f)) +
                                       r2 * ((T(4.1666646e-2f) + r * T(8.3335698e-3f)) + r2 * T(1.3943e-3f)));
@@ -32,10 +32,10 @@ MEDULLA_FN T exponential(T x) noexcept {
 template <class T>
 MEDULLA_FN T absorbed(T x, T left) noexcept {
     const T z = choose(x < T(0.25f), x, T(0.0f));
-    const T small =
+    const T series =
         z * (T(1.0f) - z * (T(0.5f) - z * (T(1.6666667e-1f) -
                                            z * (T(4.1666667e-2f) - z * (T(8.3333333e-3f) - z * T(1.3888889e-3f))))));
-    return choose(x < T(0.25f), small, T(1.0f) - left);
+    return choose(x < T(0.25f), series, T(1.0f) - left);
 }
 
 /// Angle in [-pi/2, pi/2] of the point (cosine >= 0, sine) on the unit circle: asin of the smaller of the two, by
@@ -45,13 +45,13 @@ MEDULLA_FN T angle(T sine, T cosine) noexcept {
     const T s = magnitude(sine);
     const auto steep = s > cosine;
     const T x = choose(steep, cosine, s);
-    const auto far = x > T(0.5f);
-    const T w = T(0.5f) * (T(1.0f) - x), z = choose(far, w, x * x);
+    const auto upper = x > T(0.5f);
+    const T w = T(0.5f) * (T(1.0f) - x), z = choose(upper, w, x * x);
     const T p =
         T(1.0f) + z * (T(1.6666752e-1f) +
                        z * (T(7.4953002e-2f) + z * (T(4.5470025e-2f) + z * (T(2.4181311e-2f) + z * T(4.2163199e-2f)))));
-    const T root = choose(far, square_root(w), x) * p;
-    const T a = choose(far, T(1.57079633f) - T(2.0f) * root, root);
+    const T root = choose(upper, square_root(w), x) * p;
+    const T a = choose(upper, T(1.57079633f) - T(2.0f) * root, root);
     return with_sign(choose(steep, T(1.57079633f) - a, a), sine);
 }
 
@@ -150,5 +150,6 @@ MEDULLA_FN SineCosine<Four> sine_cosine(Four x) noexcept { return polynomial::si
 /// Cosines of angles in [-pi/2, pi/2].
 MEDULLA_FN Four cosine(Four x) noexcept { return polynomial::cosine(x); }
 
-}  // namespace real_math
+}  // namespace detail
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "medulla/lanes.hpp"
+#include "medulla/detail/lanes.hpp"
 #include "medulla/pack.hpp"
 
 #if defined(MEDULLA_SSE2) && defined(__GNUC__) && defined(__x86_64__) && !defined(__CUDACC__) && !defined(__HIPCC__)
@@ -16,8 +16,9 @@
 #endif
 
 namespace medulla {
-
+inline namespace MEDULLA_TARGET {
 namespace detail {
+
 
 /// Eight components side by side: AVX2 where the renderer is built for it, SSE2, which every x86-64 has, or plain
 /// floats.
@@ -349,6 +350,7 @@ MEDULLA_FN float sum_of_blend(const TableView& table, std::uint32_t k, std::uint
     return sum_of(plus(sum[0], times(sign, sum[1])));
 }
 
-}  // namespace detail
 
+}  // namespace detail
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -4,8 +4,8 @@
 #include <random>
 #include <vector>
 
-#include "../bench/chiang_hair.hpp"
-#include "support/statistics.hpp"
+#include "bench/chiang_hair.hpp"
+#include "tests/support/statistics.hpp"
 
 using namespace chiang;
 

@@ -21,8 +21,8 @@ double strand_by_crossings(const FurParameters<1>& f, double sigma_ca) {
         for (int k = 0; k < offsets; ++k) {
             const double theta = pi / 2 * (i + 0.5) / inclinations, gamma = pi / 2 * (k + 0.5) / offsets;
             const double weight = std::cos(theta) * std::cos(theta) * std::cos(gamma);
-            const auto at = inclination(double(f.eta), std::cos(theta), f.fresnel);
-            const auto path = trace(at, kappa, double(f.layers), std::sin(gamma), std::cos(gamma));
+            const auto at = detail::inclination(double(f.eta), std::cos(theta), f.fresnel);
+            const auto path = detail::trace(at, kappa, double(f.layers), std::sin(gamma), std::cos(gamma));
             const double F = path.cuticle.F, straight = 2 * path.s_m * at.inverse_cos_t;
             const double cortex = std::exp(-2 * path.s_c * at.inverse_cos_t * sigma_ca);
             const double unscattered = std::exp(-straight * (ms + ma)) * cortex;

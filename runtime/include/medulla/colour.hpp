@@ -1,15 +1,16 @@
 // From pigments, from physical units and from a wanted colour to the absorption of the cortex.
-// Rests on cross_section.hpp: the energies of the lobes say how bright a fibre is, medulla and surface counted;
+// Rests on detail/cross_section.hpp: the energies of the lobes say how bright a fibre is, medulla and surface counted;
 // docs/bcsdf.md, 'Colour', derives the albedo of a coat, and bench_coat_colour measures how far it is off.
 #pragma once
 
 #include <cmath>
 
 #include "medulla/config.hpp"
-#include "medulla/cross_section.hpp"
+#include "medulla/detail/cross_section.hpp"
 #include "medulla/fur_parameters.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
 
 /// Absorption of a concentration 1 of each pigment in linear sRGB [1 / fibre radius]: d'Eon et al. 2011, 'An
 /// Energy-Conserving Hair Reflectance Model'. Human hair has concentrations of about 0.3 (blond), 1.3 (brown), 8
@@ -110,7 +111,7 @@ class FibreAlbedo {
         float through, through_length;      ///< what one crossing of the fibre leaves unscattered
         float scattered, scattered_length;  ///< what one crossing scatters out of the fibre
         float cosine[3];                    ///< mean cosine between R, TT, TRT and the light's travel
-        float tail_cosine;
+        float residual_cosine;
     };
     struct Light {
         float energy;   ///< returned, of 1
@@ -124,8 +125,8 @@ class FibreAlbedo {
         const float step = float(pi / 2) / float(offsets), gamma = step * (float(k) + 0.5f);
         node.weight = float(4 / (2 * inclinations + 1.0)) * cos_i * cos_i *
                       (std::sin(step * float(k + 1)) - std::sin(step * float(k)));
-        const Inclination<float> at = inclination(p.eta, cos_i, p.fresnel);
-        const Path<float> path = trace(at, p.kappa, p.layers, std::sin(gamma), std::cos(gamma));
+        const detail::Inclination<float> at = detail::inclination(p.eta, cos_i, p.fresnel);
+        const detail::Path<float> path = detail::trace(at, p.kappa, p.layers, std::sin(gamma), std::cos(gamma));
         const float depth = 2 * path.s_m * p.sigma_ms * at.inverse_cos_t;
         node.F = path.cuticle.F;
         node.through = std::exp(-2 * path.s_m * (p.sigma_ms + p.sigma_ma) * at.inverse_cos_t);
@@ -137,10 +138,11 @@ class FibreAlbedo {
             const float m = rough[lobe] * p.beta_m;
             const float along = std::cos(shift[lobe] * p.alpha) * std::exp(-0.5f * m * m);
             const float across = std::exp(-0.5f * float(lobe + 1) * p.beta_n * p.beta_n) *
-                                 std::cos(unscattered_centre(lobe, path.gamma_i, path.gamma_t));
+                                 std::cos(detail::unscattered_centre(lobe, path.gamma_i, path.gamma_t));
             node.cosine[lobe] = along * (sin_i * sin_i - cos_i * cos_i * across);
         }
-        node.tail_cosine = sin_i * sin_i;
+        const float m = 2.5f * p.beta_m;
+        node.residual_cosine = std::cos(2.5f * p.alpha) * std::exp(-0.5f * m * m) * sin_i * sin_i;
     }
 
     MEDULLA_FN Light at(float sigma_ca) const noexcept {
@@ -150,12 +152,12 @@ class FibreAlbedo {
             const float scattered = n.scattered * std::exp(-n.scattered_length * sigma_ca);
             const float TT = T * T * through, TRT = TT * n.F * through;
             const float TTs = T * scattered, TRTs = TTs * n.F * through;
-            // All paths after TRT and TRTs: a geometric series.
+            // Energies of detail/cross_section.hpp, whose exponents in sigma_ca are kept apart here.
             const float inside = T * n.F * n.F * through * through;
-            const float tail = inside > 0 ? inside * (T * through + scattered) / (1 - n.F * through) : 0.0f;
-            sum.energy += n.weight * (n.F + TT + TRT + TTs + TRTs + tail);
+            const float residual = inside > 0 ? inside * (T * through + scattered) / (1 - n.F * through) : 0.0f;
+            sum.energy += n.weight * (n.F + TT + TRT + TTs + TRTs + residual);
             sum.forward += n.weight * (n.F * n.cosine[0] + TT * n.cosine[1] + TRT * n.cosine[2] +
-                                       TTs * scattered_cosine_ + tail * n.tail_cosine);
+                                       TTs * scattered_cosine_ + residual * n.residual_cosine);
         }
         return sum;
     }
@@ -178,14 +180,14 @@ MEDULLA_FN SigmaOfColour<Channels> sigma_of_colour(const FurParameters<Channels>
     SigmaOfColour<Channels> result;
     FurParameters<Channels> others = p;
     for (float& s : others.sigma_ca) s = 0;
-    const bool usable_parameters = usable(check(others));
+    const bool usable_parameters = out_of_range(others) == 0;
     const FibreAlbedo fibre(usable_parameters ? others : FurParameters<Channels>());
     for (int c = 0; c < Channels; ++c) {
         const float wanted = colour[c];
         ColourStatus& status = result.status[c];
         if (!usable_parameters)
             status = ColourStatus::bad_parameters;
-        else if (!(wanted >= 0 && wanted <= 1))
+        else if (!detail::within(wanted, 0.0f, 1.0f))
             status = ColourStatus::bad_colour;
         else if (wanted > albedo(fibre, 0.0f))
             status = ColourStatus::too_bright;
@@ -220,4 +222,5 @@ MEDULLA_FN SigmaOfColour<Channels> sigma_ca_of_fur_colour(const FurParameters<Ch
     return detail::sigma_of_colour(p, colour, [](const FibreAlbedo& a, float sigma) { return a.fur(sigma); });
 }
 
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -7,6 +7,7 @@
 #include "medulla/config.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
 
 /// Random numbers in (0, 1).
 template <int Count>
@@ -58,4 +59,5 @@ MEDULLA_FN float reuse(float u, float low, float high) noexcept {
     return x > 0 ? (x < 1 ? x : 1.0f) : 0.0f;
 }
 
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -84,8 +84,7 @@ class Medulla final : public BSDF<Float, Spectrum> {
         return eval_pdf(ctx, si, wo, active).first;
     }
 
-    Float pdf(const BSDFContext& ctx, const SurfaceInteraction3f& si, const Vector3f& wo,
-              Mask active) const override {
+    Float pdf(const BSDFContext& ctx, const SurfaceInteraction3f& si, const Vector3f& wo, Mask active) const override {
         return eval_pdf(ctx, si, wo, active).second;
     }
 

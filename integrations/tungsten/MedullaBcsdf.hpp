@@ -85,8 +85,9 @@ class MedullaBcsdf : public Bsdf {
         if (!event.requestedLobe.test(BsdfLobes::GlossyLobe)) return false;
         const Vec2f xi1 = event.sampler->next2D(), xi2 = event.sampler->next2D();
         const float offset = _whole_width ? event.sampler->next1D() : 0.0f;
-        const medulla::Sample<3> s = at(
-            event, [&](const auto& hit) { return hit.sample({xi1.x(), xi1.y(), xi2.x(), xi2.y(), offset}); });
+        const medulla::Sample<3> s = at(event, [&](const auto& hit) {
+            return hit.sample({xi1.x(), xi1.y(), xi2.x(), xi2.y(), offset});
+        });
         if (!(s.pdf > 0)) return false;
         event.wo = Vec3f(s.direction.z, s.direction.x, s.direction.y);
         event.pdf = s.pdf;

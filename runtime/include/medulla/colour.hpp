@@ -75,7 +75,7 @@ MEDULLA_FN float half_space_albedo(float albedo, float mean_cosine) noexcept {
 inline constexpr float largest_sigma_ca = 64;
 
 /// What fibres of one material return of a white sky, by their sigma_ca: one strand alone, and a coat too thick to see
-/// through. The coat's fibres lie in all directions; flat and parallel ones return up to 10 % more (bench_coat_colour).
+/// through. The coat's fibres lie in all directions; docs/integrations.md says what parallel ones return.
 /// 4 KB, 16 us to make, 2 us an albedo: for a material or a texture's table, not for every hit.
 class FibreAlbedo {
   public:

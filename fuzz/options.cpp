@@ -21,8 +21,8 @@ std::vector<std::string> arguments_of(const unsigned char* data, std::size_t siz
 // Declared once, since that takes longer than parsing; CLI11 resets its state at each parse.
 struct Precompute {
     CLI::App app{"fuzz"};
-    Options options;
-    Precompute() { declare(app, options); }
+    Arguments args;
+    Precompute() { declare(app, args); }
 };
 struct Furtable {
     CLI::App app{"fuzz"};
@@ -41,9 +41,9 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
     try {
         if (data[0] % 2 == 0) {
             static Precompute program;
-            program.options = Options();
+            program.args = Arguments();
             program.app.parse(arguments);
-            const Job job = job_of(program.options);
+            const Job job = job_of(program.args);
             if (job.share && (job.share->index < 1 || job.share->index > job.share->count)) std::abort();
             check_request(job.request);
         } else {

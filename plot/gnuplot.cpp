@@ -102,12 +102,12 @@ std::string axis_text(const char* name, const Axis& axis) {
         axis.low, axis.high, axis.log ? "set" : "unset", ticks(axis));
 }
 
-/// The points of a curve; on a line, those that change the picture by more than a twentieth of a pixel.
+/// The points of a curve that change the picture by more than a twentieth of a pixel; of a curve with marks, all.
 std::string data_of(const Panel& panel, const Curve& curve, double height, const std::string& name) {
     const Axis& axis = panel.y;
     std::vector<double> y = curve.y, pixels(y.size());
     for (std::size_t i = 0; i < y.size(); ++i) {
-        // What a logarithmic axis has no place for leaves the panel through its lower edge.
+        // Values that a logarithmic axis cannot show leave the panel through its lower edge.
         if (axis.log) y[i] = std::max(y[i], axis.low * 1e-3);
         pixels[i] =
             height * (axis.log ? std::log(y[i]) / std::log(axis.high / axis.low) : y[i] / (axis.high - axis.low));

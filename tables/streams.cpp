@@ -16,14 +16,14 @@ namespace medulla::tables {
 namespace {
 
 constexpr int patience_ms = 1000, most_tries = 100;
-// A stream that is ready takes so much at once, whatever it is (POSIX: a pipe at least 512 bytes).
+// A ready stream of any kind accepts this much at once (POSIX: a pipe at least 512 bytes).
 constexpr std::size_t most_at_once = 512;
 constexpr std::size_t buffered = std::size_t{1} << 16;
 
-std::atomic<bool> stalled[3] = {};  ///< a stream that let a message wait in vain; no further one waits for it
+std::atomic<bool> stalled[3] = {};  ///< streams that blocked; later messages do not wait for them
 static_assert(std::atomic<bool>::is_always_lock_free);
 
-std::string printed;  ///< what standard output has not been given yet
+std::string printed;  ///< text not yet written to standard output
 bool messages_only = false;
 
 }  // namespace
@@ -31,7 +31,7 @@ bool messages_only = false;
 void guard_streams() {
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
         if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF) {
-            // The lowest free number is this one, since those below it are open.
+            // This is the lowest free number, since those below it are open.
             const int flags = stream == STDIN_FILENO ? O_WRONLY : O_RDONLY;
             if (::open("/dev/null", flags) != stream) ::_exit(1);
         }
@@ -75,7 +75,7 @@ bool write_all(int descriptor, const void* data, std::size_t size) {
     const auto* bytes = static_cast<const char*>(data);
     while (size > 0) {
         const ssize_t n = ::write(descriptor, bytes, size);
-        if (n < 0 && errno == EAGAIN) {  // whoever shares the descriptor made it one that does not wait
+        if (n < 0 && errno == EAGAIN) {  // a process that shares the descriptor made it non-blocking
             struct pollfd ready = {descriptor, POLLOUT, 0};
             ::poll(&ready, 1, -1);
         } else if (n <= 0 && !(n < 0 && errno == EINTR)) {

@@ -96,14 +96,23 @@ void store(const Fit& fit, const Normalised& input, const std::vector<std::size_
     report.degeneracy = degeneracy(model, input.restore(1));
 }
 
-CpResult cp_als(const Tensor& tensor, const CpOptions& options) {
+CpResult solved(const Tensor& tensor, const CpOptions& options, const char* solver,
+                const std::function<void(const Normalised& input, CpResult& result)>& solve) {
     const auto begin = std::chrono::steady_clock::now();
     require_valid(options);
     const Normalised input(tensor);
     CpResult result;
-    if (input.norm() == 0) {
+    if (input.norm() == 0)
         result = zero_result(tensor.shape, options);
-    } else {
+    else
+        solve(input, result);
+    result.report.solver = solver;
+    result.report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return result;
+}
+
+CpResult cp_als(const Tensor& tensor, const CpOptions& options) {
+    return solved(tensor, options, "als", [&](const Normalised& input, CpResult& result) {
         const SplitTensor split(input.tensor().values.data(), tensor.shape);
         const Fit best = best_of(options.restarts.value_or(1), result.report, [&](int start) {
             return als_sweeps(split, 1 / input.norm(),
@@ -111,11 +120,8 @@ CpResult cp_als(const Tensor& tensor, const CpOptions& options) {
         });
         store(best, input, tensor.shape, result);
         result.report.relative_error = best.error;
-    }
-    result.report.solver = "als";
-    result.report.ridge = options.ridge.value_or(0.0);
-    result.report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    return result;
+        result.report.ridge = options.ridge.value_or(0.0);
+    });
 }
 
 }  // namespace medulla::tensor

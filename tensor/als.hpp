@@ -2,6 +2,8 @@
 // Rests on mttkrp.hpp and solving.hpp; internal to this folder.
 #pragma once
 
+#include <functional>
+
 #include "tensor/solving.hpp"
 
 namespace medulla::tensor {
@@ -35,5 +37,10 @@ Fit als_sweeps(const SplitTensor& tensor, double scale, Factors start, const CpO
 
 /// Stores a fit: its model in the units of the input, canonical, and what the report says of its solve on `core`.
 void store(const Fit& fit, const Normalised& input, const std::vector<std::size_t>& core, CpResult& result);
+
+/// What all solvers have in common: checks of the input, the result for the zero tensor, the time.
+/// @param solve called unless the tensor is zero; stores the model and the rest of the report
+CpResult solved(const Tensor& tensor, const CpOptions& options, const char* solver,
+                const std::function<void(const Normalised& input, CpResult& result)>& solve);
 
 }  // namespace medulla::tensor

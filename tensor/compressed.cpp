@@ -1,6 +1,5 @@
 // The fast solvers: solve on the core of a truncated HOSVD, then expand the factors with its bases.
 // Bro & Andersson 1998: |x - m|^2 = |core - m_core|^2 + |x - core x bases|^2, so only the truncation is lost.
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -68,14 +67,8 @@ struct Recipe {
 };
 
 CpResult solve_compressed(const Tensor& tensor, const CpOptions& options, const Recipe& recipe, const char* name) {
-    const auto begin = std::chrono::steady_clock::now();
-    require_valid(options);
-    const Normalised input(tensor);
-    CpResult result;
-    CpReport& report = result.report;
-    if (input.norm() == 0) {
-        result = zero_result(tensor.shape, options);
-    } else {
+    return solved(tensor, options, name, [&](const Normalised& input, CpResult& result) {
+        CpReport& report = result.report;
         double truncation = options.truncation.value_or(recipe.truncation);
         auto level = std::make_unique<Level>(truncated_hosvd(input.tensor(), truncation));
         Fit fit = recipe.first(*level, report);
@@ -101,10 +94,7 @@ CpResult solve_compressed(const Tensor& tensor, const CpOptions& options, const 
         report.relative_error = level->total_error(fit, input.norm());
         // Gram matrices resolve the truncation to 1e-8 at best: for small errors, evaluate explicitly.
         if (report.relative_error < 1e-5) report.relative_error = relative_error(tensor, result.model);
-    }
-    report.solver = name;
-    report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    return result;
+    });
 }
 
 }  // namespace

@@ -27,6 +27,12 @@ Eigen::MatrixXd cosines_of(const CpModel& model) {
 }  // namespace
 
 CpResult cp(const Tensor& tensor, Solver solver, const CpOptions& options) {
+    require_valid(options);
+    if (options.rank >= most_components(tensor.shape)) {
+        CpResult result = cp_fibres(tensor, solver == Solver::nonnegative);
+        result.report.spare = options.rank - result.model.rank();
+        return result;
+    }
     switch (solver) {
         case Solver::als:
             return cp_als_compressed(tensor, options);
@@ -130,6 +136,16 @@ Degeneracy degeneracy(const CpModel& model, double tensor_norm) {
     return result;
 }
 
+int most_components(const std::vector<std::size_t>& shape) {
+    constexpr auto greatest = static_cast<std::size_t>(std::numeric_limits<int>::max());
+    const auto longest = std::max_element(shape.begin(), shape.end());
+    std::size_t product = 1;
+    for (auto length = shape.begin(); length != shape.end(); ++length)
+        if (length != longest)
+            product = *length > greatest / std::max<std::size_t>(product, 1) ? greatest : product * *length;
+    return static_cast<int>(product);
+}
+
 std::string to_string(Stop stop) {
     constexpr const char* texts[] = {"converged", "sweeps spent", "exact to rounding", "no step lowers the objective",
                                      "the tensor is zero"};
@@ -147,6 +163,9 @@ std::string summary(const CpReport& report) {
                       report.degeneracy.least_cosine, report.degeneracy.norm_ratio);
         line += text;
     }
+    if (report.spare > 0)
+        line +=
+            "; " + std::to_string(report.spare) + " of the requested components left out: no such tensor needs them";
     return line;
 }
 

@@ -46,6 +46,10 @@ struct Degeneracy {
 /// @param tensor_norm denominator of norm_ratio
 Degeneracy degeneracy(const CpModel& model, double tensor_norm);
 
+/// Components that are enough for any tensor of this shape: one for each fibre along its longest axis (Kruskal 1989).
+/// At most the greatest int.
+int most_components(const std::vector<std::size_t>& shape);
+
 /// Why a solver stopped.
 enum class Stop {
     converged,    ///< error fell by less than `tolerance` of itself over the last half of all sweeps
@@ -69,6 +73,7 @@ struct CpReport {
     double seconds = 0;             ///< wall clock, all starts
     std::vector<double> trace;      ///< relative error after each sweep of the solve that was returned
     std::vector<double> starts;     ///< final relative error of each start, in order
+    int spare = 0;                  ///< requested components that were left out, see most_components
 
     /// Components cancel: the sum of their norms exceeds 10 times the tensor's.
     bool degenerate() const { return degeneracy.norm_ratio > 10; }
@@ -112,8 +117,14 @@ CpResult cp_lm(const Tensor& tensor, const CpOptions& options);
 /// As cp_als, with every factor >= 0.
 CpResult cp_nonnegative(const Tensor& tensor, const CpOptions& options);
 
+/// The fibres of the tensor along its longest axis as components, without a solve. Signed components are the fibres of
+/// the core of a HOSVD at finest_truncation: orthogonal and exact. Nonnegative ones are the fibres of the tensor itself
+/// with negative numbers clamped to 0, which is the best nonnegative fit.
+CpResult cp_fibres(const Tensor& tensor, bool nonnegative);
+
 enum class Solver { als, lm, nonnegative };
-/// Calls the fast implementation: cp_als_compressed, cp_lm or cp_nonnegative.
+/// Calls the fast implementation: cp_als_compressed, cp_lm or cp_nonnegative. If options.rank is at least
+/// most_components, cp_fibres instead, whose model has at most that many components.
 CpResult cp(const Tensor& tensor, Solver solver, const CpOptions& options);
 
 }  // namespace medulla::tensor

@@ -186,7 +186,7 @@ class NormalEquations {
             multiply(inverse_[last], coupling_.transpose(), half_);
             multiply(half_, grams_[last], through_);
         }
-        // Row by row, so that what all sums share is read from memory once.
+        // Row by row, so that the common operands of all sums are read from memory once.
         sums_.resize(order_);
         for (RowMatrix& sum : sums_) sum.resize(rank_, rank_);
         for (Index row = 0; row < rank_; ++row)

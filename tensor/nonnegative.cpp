@@ -1,6 +1,5 @@
 // CP with every factor >= 0: coordinate descent column by column (HALS), with MTTKRPs on a HOSVD core.
 // Cichocki & Phan 2009, "Fast local algorithms for large scale nonnegative matrix and tensor factorizations".
-#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -90,13 +89,7 @@ Fit hals_sweeps(const Hosvd& hosvd, double scale, Factors start, const CpOptions
 }  // namespace
 
 CpResult cp_nonnegative(const Tensor& tensor, const CpOptions& options) {
-    const auto begin = std::chrono::steady_clock::now();
-    require_valid(options);
-    const Normalised input(tensor);
-    CpResult result;
-    if (input.norm() == 0) {
-        result = zero_result(tensor.shape, options);
-    } else {
+    return solved(tensor, options, "nonnegative", [&](const Normalised& input, CpResult& result) {
         const Hosvd hosvd = truncated_hosvd(input.tensor(), options.truncation.value_or(1e-4));
         const double core_norm = norm(hosvd.core);
         Fit best = best_of(options.restarts.value_or(1), result.report, [&](int start) {
@@ -109,11 +102,8 @@ CpResult cp_nonnegative(const Tensor& tensor, const CpOptions& options) {
         result.report.truncation_error = hosvd.error;
         // The discarded part is not orthogonal to nonnegative factors, so the error is evaluated explicitly.
         result.report.relative_error = relative_error(tensor, result.model);
-    }
-    result.report.solver = "nonnegative";
-    result.report.ridge = options.ridge.value_or(0.0);
-    result.report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    return result;
+        result.report.ridge = options.ridge.value_or(0.0);
+    });
 }
 
 }  // namespace medulla::tensor

@@ -18,6 +18,8 @@ import tempfile
 import time
 import unittest
 
+from support.runs import CLEAN, sanitized
+
 BIN = os.path.abspath(sys.argv[1])
 KILLS = int(os.environ.get("MEDULLA_KILLS", "40"))
 SIZES = int(os.environ.get("MEDULLA_SIZES", "12"))
@@ -28,25 +30,13 @@ AXES = ["--sigma-range", "0:4:6", "--g-range", "0:0.6:4", "--h-range", "0:1:3", 
 SMALL = AXES + ["--method", "analog", "--paths", "1500"]
 
 
-def clean_environment():
-    """Launchers' variables would make a worker of every run."""
-    return {k: v for k, v in os.environ.items() if not k.startswith(("SLURM_", "OMPI_", "PMI", "PALS_", "MV2_", "MVP_", "FLUX_", "JSM_", "ALPS_"))}
+def start(program, *args, environment={}, **options):
+    return subprocess.Popen([os.path.join(BIN, program), *map(str, args)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                            text=True, env=dict(CLEAN, **environment), **options)
 
 
-def sanitized():
-    """Built with a sanitizer, whose memory map no emulator gives."""
-    with open(os.path.join(BIN, "furtable"), "rb") as f:
-        program = f.read()
-    return b"__asan_init" in program or b"__tsan_init" in program
-
-
-def start(program, *words, environment={}, **options):
-    return subprocess.Popen([os.path.join(BIN, program), *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                            text=True, env=dict(clean_environment(), **environment), **options)
-
-
-def run(program, *words, **options):
-    process = start(program, *words, **options)
+def run(program, *args, **options):
+    process = start(program, *args, **options)
     out, err = process.communicate()
     return process.returncode, out, err
 
@@ -65,8 +55,8 @@ class Nothing(unittest.TestCase):
     def tearDown(self):
         self.folder.cleanup()
 
-    def solve(self, name, *words, status=0):
-        code, out, err = run("medulla-precompute", "-o", self.path(name), *words)
+    def solve(self, name, *args, status=0):
+        code, out, err = run("medulla-precompute", "-o", self.path(name), *args)
         self.assertEqual(code, status, err)
         return err
 
@@ -90,9 +80,9 @@ class Nothing(unittest.TestCase):
         os.remove(self.path("t.h5"))
         kills = finished = kept_after_kill = 0
         while kills < KILLS:
-            # Goes on from what the last kill left, or from nothing after a run that was brought to its end.
-            words = ["-o", self.path("t.h5"), *SMALL, "--resume", "--threads", rng.choice([1, 2, 3])]
-            process = start("medulla-precompute", *words)
+            # Resumes what the last kill left, or starts anew after a run that was completed.
+            args = ["-o", self.path("t.h5"), *SMALL, "--resume", "--threads", rng.choice([1, 2, 3])]
+            process = start("medulla-precompute", *args)
             time.sleep(rng.uniform(0, 1.1 * whole) * rng.choice([1, 0.5]))
             process.kill()
             out, err = process.communicate()
@@ -102,16 +92,16 @@ class Nothing(unittest.TestCase):
             else:
                 self.assertEqual(process.returncode, 0)
             self.assertLessEqual(set(os.listdir(self.folder.name)), {"t.h5", "t.h5.shards"})
-            if os.path.exists(self.path("t.h5")):  # there only if whole
+            if os.path.exists(self.path("t.h5")):  # exists only if complete
                 self.assertEqual(sha(self.path("t.h5")), expected)
                 self.solve("t.h5", *SMALL, "--resume")  # clears what the kill left of the folder
                 self.assertEqual(os.listdir(self.folder.name), ["t.h5"])
                 finished += 1
                 os.remove(self.path("t.h5"))
             else:
-                shards = self.path("t.h5.shards")
-                if os.path.exists(shards):
-                    kept_after_kill += any(name.endswith(".shard") for name in os.listdir(shards))
+                slices = self.path("t.h5.shards")
+                if os.path.exists(slices):
+                    kept_after_kill += any(name.endswith(".shard") for name in os.listdir(slices))
                 if rng.random() < 0.3:
                     self.solve("t.h5", *SMALL, "--resume")
                     self.assertEqual(sha(self.path("t.h5")), expected)
@@ -162,32 +152,32 @@ class Nothing(unittest.TestCase):
             self.assertEqual(sha(self.path("t.h5")), expected)
             os.remove(self.path("t.h5"))
 
-    def test_same_contents_for_threads_and_shards(self):
+    def test_same_contents_for_threads_and_workers(self):
         for method in (["--method", "analog", "--paths", "1500"], ["--method", "auto"]):
-            words = AXES + method
-            self.solve("t.h5", *words)
+            args = AXES + method
+            self.solve("t.h5", *args)
             expected = sha(self.path("t.h5"))
             for threads in (1, 2, 3, 8):
-                self.solve("u.h5", *words, "--threads", threads)
+                self.solve("u.h5", *args, "--threads", threads)
                 self.assertEqual(sha(self.path("u.h5")), expected)
                 with open(self.path("t.h5"), "rb") as a, open(self.path("u.h5"), "rb") as b:
                     self.assertEqual(a.read(), b.read())
-            for shards in (1, 2, 4):
-                workers = [start("medulla-precompute", "-o", self.path(f"n{shards}.h5"), *words, "--shard", f"{i + 1}/{shards}")
-                           for i in range(shards)]  # all at once, into one folder
+            for count in (1, 2, 4):
+                workers = [start("medulla-precompute", "-o", self.path(f"n{count}.h5"), *args, "--shard", f"{i + 1}/{count}")
+                           for i in range(count)]  # all at once, into one folder
                 for worker in workers:
                     out, err = worker.communicate()
                     self.assertEqual((worker.returncode, err), (0, ""))
-                name = self.path(f"n{shards}.h5")
+                name = self.path(f"n{count}.h5")
                 self.assertEqual(run("furtable", "merge", name + ".shards", "-o", name)[0], 0)
                 self.assertEqual(sha(name), expected)
                 shutil.rmtree(name + ".shards")
 
     def test_same_contents_on_other_processors(self):
-        """docs/robustness.md: glibc takes other code of exp, log, sin where there is no AVX2 and FMA; our own loops choose
-        by the processor, which only another one changes: an emulated Nehalem (SSE4.2), where qemu-user is there."""
+        """docs/robustness.md: without AVX2 and FMA glibc selects other code for exp, log and sin. The programs' own loops
+        select by processor, so they run on an emulated Nehalem (SSE4.2) if qemu-user is installed."""
         plain = dict(GLIBC_TUNABLES="glibc.cpu.hwcaps=-AVX2,-FMA")
-        emulator = None if sanitized() else shutil.which("qemu-x86_64")
+        emulator = None if sanitized(BIN) else shutil.which("qemu-x86_64")
         small = ["--sigma-range", "0:4:2", "--g-range", "0.3:0.3", "--h-range", "0:1:3", "--theta-range", "0:80:3", "--bins",
                  "36", "--threads", "1", "--progress", "none"]
         for method in (["--method", "analog", "--paths", "3000"], ["--method", "deterministic"]):
@@ -197,8 +187,8 @@ class Nothing(unittest.TestCase):
             self.assertEqual(sha(self.path("plain.h5")), sha(self.path("fast.h5")), method)
             if emulator:
                 self.solve("fast.h5", *small, *method)
-                words = [emulator, "-cpu", "Nehalem", os.path.join(BIN, "medulla-precompute"), "-o", self.path("old.h5")]
-                done = subprocess.run([*words, *small, *method], capture_output=True, text=True, env=clean_environment())
+                args = [emulator, "-cpu", "Nehalem", os.path.join(BIN, "medulla-precompute"), "-o", self.path("old.h5")]
+                done = subprocess.run([*args, *small, *method], capture_output=True, text=True, env=CLEAN)
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertEqual(sha(self.path("old.h5")), sha(self.path("fast.h5")), method)
             os.remove(self.path("fast.h5"))
@@ -207,7 +197,7 @@ class Nothing(unittest.TestCase):
                 os.remove(self.path("old.h5"))
 
     def test_what_the_hash_is_made_of(self):
-        """docs/formats.md's definition, by another program."""
+        """The hash as docs/formats.md defines it, by another program."""
         import h5py
         self.solve("plain.h5", *SMALL, "--compression", "none")
         digest = hashlib.sha256()
@@ -226,7 +216,7 @@ class Nothing(unittest.TestCase):
         self.assertIn(digest.hexdigest(), out)
 
     def test_interrupt_within_one_long_slice(self):
-        """No slice ends for hours: the process still does."""
+        """A slice would take hours, but the process ends."""
         process = start("medulla-precompute", "-o", self.path("t.h5"), "--sigma-range", "900:900", "--g-range", "0.9:0.9",
                         "--table", "azimuthal", "--method", "analog", "--paths", 10**9, "--progress", "none")
         time.sleep(0.5)
@@ -241,7 +231,7 @@ class Nothing(unittest.TestCase):
         self.assertEqual(os.listdir(self.folder.name), ["t.h5"])  # before anything is solved
 
     def test_file_size_limit(self):
-        """EFBIG at every stage: what RLIMIT_FSIZE cuts stands for any write that fails midway."""
+        """EFBIG at every stage, by RLIMIT_FSIZE, as an example of any write that fails midway."""
         import resource
         expected = self.reference()
         self.solve("t.h5", *SMALL)
@@ -261,7 +251,7 @@ class Nothing(unittest.TestCase):
             os.remove(self.path("t.h5"))
 
     def test_full_disk_and_read_only_folder(self):
-        """In a name space of its own, where it may mount small file systems."""
+        """In a separate name space, in which small file systems can be mounted."""
         code = subprocess.run(["unshare", "-rm", "true"], capture_output=True).returncode
         if code != 0:
             self.skipTest("no right to mount a small file system (unshare -rm)")
@@ -284,13 +274,13 @@ class Disks(Nothing):
         expected = self.reference()
         self.solve("t.h5", *SMALL)
         size = os.path.getsize(self.path("t.h5"))
-        words, full, fitted = ["-o", self.path("disk/t.h5"), *SMALL], 0, 0
-        # From nothing to room for everything: shards of a page each, then the file itself beside them.
+        args, full, fitted = ["-o", self.path("disk/t.h5"), *SMALL], 0, 0
+        # From no space to enough for everything: slice files of a page each, plus the file itself.
         room = 56 * 4096 + 2 * size
         for i in range(SIZES):
             pages = 1 + i * (room // 4096) // (SIZES - 1)
             disk = self.mount(f"size={4096 * pages}")
-            code, out, err = run("medulla-precompute", *words)
+            code, out, err = run("medulla-precompute", *args)
             if code == 0:
                 fitted += 1
                 self.assertEqual(err, "")
@@ -304,7 +294,7 @@ class Disks(Nothing):
                 if "--resume" not in err:
                     self.assertEqual(left, [])
                 subprocess.run(["mount", "-o", "remount,size=64m", disk], check=True)
-                code, out, err = run("medulla-precompute", *words, "--resume")
+                code, out, err = run("medulla-precompute", *args, "--resume")
                 self.assertEqual((code, err), (0, ""))
             self.assertEqual(sha(disk + "/t.h5"), expected)
             self.assertEqual(os.listdir(disk), ["t.h5"])
@@ -318,14 +308,14 @@ class Disks(Nothing):
         self.solve("u.h5", *SMALL)
         for i in range(6):
             disk = self.mount(f"size={4096 * (1 + 2 * i)}")
-            for words in (["merge", self.path("t.h5.shards"), "-o", disk + "/m.h5"],
+            for args in (["merge", self.path("t.h5.shards"), "-o", disk + "/m.h5"],
                           ["compress", self.path("u.h5"), "--rank", 8, "--solver", "als", "-o", disk + "/m.furpack"]):
-                code, out, err = run("furtable", *words)
+                code, out, err = run("furtable", *args)
                 if code == 0:
-                    self.assertEqual(run("furtable", "verify", words[-1])[0], 0)
-                    os.remove(words[-1])
+                    self.assertEqual(run("furtable", "verify", args[-1])[0], 0)
+                    os.remove(args[-1])
                 else:
-                    self.one_line(err, words[-1], "No space left on device")
+                    self.one_line(err, args[-1], "No space left on device")
                 self.assertEqual(os.listdir(disk), [])
             subprocess.run(["umount", disk], check=True)
 
@@ -333,10 +323,10 @@ class Disks(Nothing):
         disk = self.mount("size=64m")
         self.solve("disk/t.h5", *SMALL, "--shard", "1/2")
         subprocess.run(["mount", "-o", "remount,ro", disk], check=True)
-        for words in ([], ["--resume"], ["--shard", "2/2"]):
-            code, out, err = run("medulla-precompute", "-o", disk + "/t.h5", *SMALL, *words)
+        for args in ([], ["--resume"], ["--shard", "2/2"]):
+            code, out, err = run("medulla-precompute", "-o", disk + "/t.h5", *SMALL, *args)
             self.assertEqual(code, 1)
-            if words:
+            if args:
                 self.one_line(err, "disk/t.h5", "Read-only file system")
         code, out, err = run("medulla-precompute", "-o", disk + "/new.h5", *SMALL)
         self.assertEqual(code, 1)

@@ -20,6 +20,7 @@
 #include "tables/pack/writer.hpp"
 #include "tables/store/file.hpp"
 #include "tables/store/tables_file.hpp"
+#include "tests/support/exercise_pack.hpp"
 #include "tests/support/small_request.hpp"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -265,30 +266,8 @@ Counts mutate_tables(std::uint64_t count, std::uint64_t seed) {
 
 // --- packs -------------------------------------------------------------------------------------------------------
 
-/// Some of all that a renderer asks a pack, also outside its axes; false: a question that has an answer got none.
-bool ask(const PackView& pack, Random& random) {
-    const float sigmas[] = {0, 0.3f, 2, 16, -1, 1e30f}, gs[] = {0, 0.5f, 0.95f, -1}, hs[] = {0, 0.7f, 1, -0.3f};
-    const float sigma = sigmas[random() % 6], g = gs[random() % 4], h = hs[random() % 4];
-    float sum = 0;
-    for (const TableView& table : pack.tables) {
-        if (!table || !table.has_exit()) continue;
-        const auto kind = static_cast<TableKind>(table.layout.kind);
-        if (kind == TableKind::azimuthal)
-            for (const float absorption : {0.0f, 0.7f, 30.0f})
-                if (absorption == 0 || absorbs(pack)) sum += azimuthal(pack, sigma, g, h, 1.0f, absorption);
-        if (kind == TableKind::longitudinal_back) sum += longitudinal(pack, Side::back, sigma, g, h, 0.3f);
-        if (kind == TableKind::longitudinal_forward) sum += longitudinal(pack, Side::forward, sigma, g, h, 0.3f);
-        LobeQuery query = {};
-        query.sigma = sigma, query.g = g, query.h = h, query.theta_i = h;
-        const Contraction contraction = contract(table, query);
-        ExitDistribution distribution;
-        distribute(table, contraction, distribution);
-        sum += distribution.pdf(0.2f) + distribution.sample(0.7f);
-    }
-    return std::isfinite(sum) || sigma < 0;  // a root of sigma is taken
-}
-
-/// Half of the mutations get their checksum mended: then the checks behind it, and the lookups, must hold.
+/// Half of the mutations get a corrected checksum, so that the checks after it are reached; a pack that opens must give
+/// finite numbers.
 Counts mutate_packs(std::uint64_t count, std::uint64_t seed) {
     CompressOptions options;
     options.rank = 4;
@@ -296,7 +275,7 @@ Counts mutate_packs(std::uint64_t count, std::uint64_t seed) {
     options.spans = {8, 8, 8};
     Bytes good = compress(simulate(small_request(), ProgressMode::none), options, "mutate").pack;
     Counts counts;
-    std::uint64_t mended = 0, mended_opened = 0;
+    std::uint64_t corrected = 0, corrected_opened = 0;
     for (std::uint64_t i = 0; i < count; ++i, ++counts.read) {
         Random random(seed * 0x9e3779b97f4a7c15u + i);
         Bytes bytes = mutate(good, random);
@@ -310,7 +289,7 @@ Counts mutate_packs(std::uint64_t count, std::uint64_t seed) {
             if (random() % 4) std::memcpy(bytes.data() + offsetof(PackHeader, byte_count), &size, sizeof size);
             const std::uint64_t sum = pack_checksum(bytes.data(), bytes.size());
             std::memcpy(bytes.data() + offsetof(PackHeader, checksum), &sum, sizeof sum);
-            ++mended;
+            ++corrected;
         }
         // Of exactly its size, so that a sanitizer sees the first byte past the end.
         const Bytes exact(bytes);
@@ -319,18 +298,19 @@ Counts mutate_packs(std::uint64_t count, std::uint64_t seed) {
             ++counts.refused;
             continue;
         }
-        if (!ask(opened.pack, random)) {
+        if (const std::string wrong = medulla::testing::exercise(opened.pack); !wrong.empty()) {
             ++counts.wild;
-            fmt::print("number {} of seed {}: not finite\n", i, seed);
+            fmt::print("number {} of seed {}: not finite, or below 0: {}\n", i, seed, wrong);
         }
         if (mend) {
-            ++mended_opened, ++counts.same;
+            ++corrected_opened, ++counts.same;
         } else {
             ++counts.silent;
             fmt::print("number {} of seed {}: silent difference\n", i, seed);
         }
     }
-    fmt::print("packs: {} had their checksum mended, of these {} opened and were asked\n", mended, mended_opened);
+    fmt::print("packs: {} had their checksum corrected, of these {} opened and were evaluated and sampled\n", corrected,
+               corrected_opened);
     return counts;
 }
 

@@ -16,19 +16,17 @@ import signal
 import stat
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import unittest
 
+from support import runs
+from support.runs import CLEAN, sanitized
+
 BIN, PRELOAD = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
 SMALL = ["--sigma-range", "0:4:2", "--g-range", "0:0.8:2", "--h-range", "0:1:3", "--theta-range", "0:90:3", "--bins", "36",
          "--threads", "1"]
-LAUNCHERS = ("SLURM_", "OMPI_", "PMI", "PALS_", "MV2_", "MVP_", "FLUX_", "JSM_", "ALPS_")
-CLEAN = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHERS)}
-with open(os.path.join(BIN, "furtable"), "rb") as program:
-    text = program.read()
-SANITIZED = b"__asan_init" in text or b"__tsan_init" in text
+SANITIZED = sanitized(BIN)
 
 
 def digest(path):
@@ -36,37 +34,18 @@ def digest(path):
         return hashlib.sha256(f.read()).hexdigest()
 
 
-class Outputs(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.made = tempfile.TemporaryDirectory()
-        good = os.path.join(cls.made.name, "t.h5")
-        assert subprocess.run([BIN + "/medulla-precompute", "-o", good, *SMALL], capture_output=True, env=CLEAN).returncode == 0
-        assert subprocess.run([BIN + "/furtable", "compress", good, "--rank", "4", "--solver", "als"],
-                              capture_output=True).returncode == 0
+class Outputs(runs.WithFiles):
+    bin, job = BIN, SMALL
 
-    @classmethod
-    def tearDownClass(cls):
-        cls.made.cleanup()
-
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.path = lambda name: os.path.join(self.folder.name, name)
-        for name in ("t.h5", "t.furpack"):
-            shutil.copy(os.path.join(self.made.name, name), self.path(name))
-
-    def tearDown(self):
-        self.folder.cleanup()
-
-    def run_in(self, program, *words, env={}, timeout=120, **options):
+    def run_in(self, program, *args, env={}, timeout=120, **options):
         options = dict(dict(stdout=subprocess.PIPE, stderr=subprocess.PIPE), **options)
-        return subprocess.run([os.path.join(BIN, program), *map(str, words)], cwd=self.folder.name, timeout=timeout,
+        return subprocess.run([os.path.join(BIN, program), *map(str, args)], cwd=self.folder.name, timeout=timeout,
                               env=dict(CLEAN, **env), **options)
 
-    def refused(self, program, *words, parts=(), **options):
-        done = self.run_in(program, *words, **options)
+    def refused(self, program, *args, parts=(), **options):
+        done = self.run_in(program, *args, **options)
         err = done.stderr.decode()
-        self.assertEqual((done.returncode, done.stdout), (1, b""), (words, err))
+        self.assertEqual((done.returncode, done.stdout), (1, b""), (args, err))
         self.assertEqual(len(err.strip().splitlines()), 1, err)
         for part in parts:
             self.assertIn(part, err)
@@ -96,12 +75,12 @@ class Outputs(unittest.TestCase):
         os.symlink("null", self.path("link"))
         os.symlink("/dev/full", self.path("full"))
         for name in ("null", "link"):
-            for words in self.commands(name):
-                done = self.run_in(*words)
-                self.assertEqual(done.returncode, 0, (words, done.stderr))
+            for args in self.commands(name):
+                done = self.run_in(*args)
+                self.assertEqual(done.returncode, 0, (args, done.stderr))
             self.refused("medulla-precompute", "-o", name, *SMALL, parts=[name, "plain file", "found a device"])
-        for words in self.commands("full"):
-            self.refused(*words, parts=["full", "No space left on device"])
+        for args in self.commands("full"):
+            self.refused(*args, parts=["full", "No space left on device"])
         self.assertTrue(stat.S_ISCHR(os.stat(self.path("null")).st_mode))
         self.assertTrue(os.path.islink(self.path("link")) and os.path.islink(self.path("full")))
 
@@ -115,17 +94,17 @@ class Outputs(unittest.TestCase):
         for name, part in (("block", "block device"), ("folder", "folder"), ("to_folder", "folder"), ("folder/", "folder"),
                            ("folder/.", "folder"), ("..", "folder"), ("new/", "/"), ("pipe", "no reader"),
                            ("none/x", "No such file"), ("t.h5/x", "Not a directory"), ("loop", "symbolic links")):
-            for words in (*self.commands(name), ["medulla-precompute", *SMALL, "-o", name]):
-                self.refused(*words, parts=[name, part if words[0] == "furtable" else ""])
+            for args in (*self.commands(name), ["medulla-precompute", *SMALL, "-o", name]):
+                self.refused(*args, parts=[name, part if args[0] == "furtable" else ""])
         self.assertEqual(sorted(set(os.listdir(self.folder.name)) - {"parts.h5.shards"}), before)
 
     def test_pipes(self):
         expected = {}
-        for k, words in enumerate(self.commands("plain")):
-            self.assertEqual(self.run_in(*words).returncode, 0)
+        for k, args in enumerate(self.commands("plain")):
+            self.assertEqual(self.run_in(*args).returncode, 0)
             expected[k] = digest(self.path("plain"))
         os.mkfifo(self.path("pipe"))
-        for k, words in enumerate(self.commands("pipe")):
+        for k, args in enumerate(self.commands("pipe")):
             got = []
 
             def reader():
@@ -133,7 +112,7 @@ class Outputs(unittest.TestCase):
                     got.append(f.read())
             thread = threading.Thread(target=reader)
             thread.start()
-            self.assertEqual(self.run_in(*words).returncode, 0, words)
+            self.assertEqual(self.run_in(*args).returncode, 0, args)
             thread.join()
             self.assertEqual(hashlib.sha256(got[0]).hexdigest(), expected[k])
         self.assertTrue(stat.S_ISFIFO(os.stat(self.path("pipe")).st_mode))
@@ -144,22 +123,22 @@ class Outputs(unittest.TestCase):
 
     def test_standard_output_as_output(self):
         """All of it is the product then; what is printed goes to standard error. >> appends."""
-        for words in self.commands("/dev/stdout"):
-            plain = self.run_in(*words[:-1], "plain")
+        for args in self.commands("/dev/stdout"):
+            plain = self.run_in(*args[:-1], "plain")
             self.assertEqual(plain.returncode, 0, plain.stderr)
             for name in ("/dev/stdout", "/proc/self/fd/1", "/dev/fd/1"):
-                done = self.run_in(*words[:-1], name)
+                done = self.run_in(*args[:-1], name)
                 self.assertEqual(done.returncode, 0, done.stderr)
-                self.assertEqual(hashlib.sha256(done.stdout).hexdigest(), digest(self.path("plain")), words)
+                self.assertEqual(hashlib.sha256(done.stdout).hexdigest(), digest(self.path("plain")), args)
             with open(self.path("log"), "wb") as f:
                 f.write(b"before")
             with open(self.path("log"), "ab") as f:
-                self.assertEqual(self.run_in(*words[:-1], "/dev/stdout", stdout=f).returncode, 0)
+                self.assertEqual(self.run_in(*args[:-1], "/dev/stdout", stdout=f).returncode, 0)
             with open(self.path("log"), "rb") as f:
                 got = f.read()
             self.assertEqual((got[:6], hashlib.sha256(got[6:]).hexdigest()), (b"before", digest(self.path("plain"))))
-            self.refused(*words[:-1], "/dev/stderr", parts=["/dev/stderr", "standard error"])
-            self.refused(*words[:-1], "/dev/stdin", parts=["/dev/stdin"], stdin=subprocess.PIPE, input=None)
+            self.refused(*args[:-1], "/dev/stderr", parts=["/dev/stderr", "standard error"])
+            self.refused(*args[:-1], "/dev/stdin", parts=["/dev/stdin"], stdin=subprocess.PIPE, input=None)
         self.refused("medulla-precompute", "-o", "/dev/stdout", *SMALL, parts=["/dev/stdout", "plain file", "pipe"])
 
     def test_links_are_followed(self):
@@ -167,8 +146,8 @@ class Outputs(unittest.TestCase):
         os.symlink("far/real", self.path("link"))
         os.symlink("link", self.path("link2"))
         for round in range(2):  # to nothing yet, then to a file
-            for words in self.commands("link2"):
-                self.assertEqual(self.run_in(*words).returncode, 0)
+            for args in self.commands("link2"):
+                self.assertEqual(self.run_in(*args).returncode, 0)
             self.assertEqual(self.run_in("medulla-precompute", "-o", "link2", *SMALL).returncode, 0)
             self.assertTrue(os.path.islink(self.path("link")) and os.path.islink(self.path("link2")))
             self.assertTrue(stat.S_ISREG(os.lstat(self.path("far/real")).st_mode))
@@ -217,17 +196,17 @@ class Outputs(unittest.TestCase):
         os.mkdir(self.path("folder"))
         bcsdf = ["bcsdf", "--theta-i", 1, "--theta-r", 1, "--phi", 1, "--far"]
         for name, part in (("pipe", "pipe"), ("folder", "folder"), ("/dev/zero", "device"), ("none", "No such file")):
-            for words in (["info"], ["verify"], ["compress"], ["diff", "t.h5"], ["diff", "default"],
+            for args in (["info"], ["verify"], ["compress"], ["diff", "t.h5"], ["diff", "default"],
                           ["export", "--format", "npy", "-o", "x"], ["plot", "-o", "x.svg"], [*bcsdf, "--material"],
                           [*bcsdf, "--preset", "cat", "--pack"]):
-                self.refused("furtable", *words, name, parts=[name, part], timeout=10)
+                self.refused("furtable", *args, name, parts=[name, part], timeout=10)
             self.refused("medulla-precompute", "-o", "new.h5", "--scene", name, parts=[name, part], timeout=10)
 
     def test_long_names(self):
         for size in (240, 247, 248, 249, 255):
             name = "n" * (size - 3) + ".h5"
-            for words in self.commands(name):
-                done = self.run_in(*words)
+            for args in self.commands(name):
+                done = self.run_in(*args)
                 self.assertEqual(done.returncode, 0, (size, done.stderr))
                 os.remove(self.path(name))
             if size + len(".shards") <= 255:
@@ -235,8 +214,8 @@ class Outputs(unittest.TestCase):
                 self.assertEqual(self.run_in("furtable", "info", name).returncode, 0)
             else:
                 self.refused("medulla-precompute", "-o", name, *SMALL, parts=["at most 255 bytes", f"found {size + 7}"])
-        for words in (*self.commands("n" * 256), ["medulla-precompute", *SMALL, "-o", "n" * 256]):
-            self.refused(*words, parts=["name"])
+        for args in (*self.commands("n" * 256), ["medulla-precompute", *SMALL, "-o", "n" * 256]):
+            self.refused(*args, parts=["name"])
         self.assertEqual([n for n in os.listdir(self.folder.name) if ".tmp" in n], [])
 
     def test_without_rights(self):
@@ -254,9 +233,9 @@ class Outputs(unittest.TestCase):
         os.chmod(self.path("closed"), 0o755)
         nobody = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
         for output in ("closed/x", "open/protected"):
-            for words in (*commands, ["medulla-precompute", *SMALL, "-o", "x"]):
-                words = [*nobody, os.path.join(BIN, words[0]), *map(str, words[1:-1]), output]
-                done = subprocess.run(words, cwd=self.folder.name, capture_output=True, text=True, env=CLEAN)
+            for args in (*commands, ["medulla-precompute", *SMALL, "-o", "x"]):
+                args = [*nobody, os.path.join(BIN, args[0]), *map(str, args[1:-1]), output]
+                done = subprocess.run(args, cwd=self.folder.name, capture_output=True, text=True, env=CLEAN)
                 self.assertEqual((done.returncode, done.stdout), (1, ""), done.stderr)
                 self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
                 self.assertIn(output + ": cannot be written: Permission denied", done.stderr)
@@ -309,8 +288,8 @@ class Outputs(unittest.TestCase):
                     self.assertEqual(done.returncode, 0, (stream, kind, progress, done.stderr))
                     self.assertEqual(digest(self.path("new.h5")), expected, (stream, kind))
                     os.remove(self.path("new.h5"))
-                for words in self.commands("new"):
-                    self.assertEqual(self.run_in(*words, **options).returncode, 0, (stream, kind, words))
+                for args in self.commands("new"):
+                    self.assertEqual(self.run_in(*args, **options).returncode, 0, (stream, kind, args))
                     os.remove(self.path("new"))
                 if stream == 2 or kind == "all closed":
                     self.assertEqual(self.run_in("furtable", "info", "none", **options).returncode, 1, kind)
@@ -327,10 +306,10 @@ class Outputs(unittest.TestCase):
                     ["furtable", "merge", "t.h5", "-o", "m.h5", "--json"], ["medulla-precompute", "--dry-run", *SMALL],
                     ["medulla-precompute", "-o", "new.h5", *SMALL, "--progress", "none", "--json"])
         for kind, options in self.bad_streams(1):
-            for words in products if kind not in ("silent", "all closed") else ():  # who waits for a product may be slow
-                done = self.run_in(*words, **options)
-                self.assertEqual(done.returncode, 1, (kind, words, done.stderr))
-                self.assertEqual(len(done.stderr.splitlines()), 1, (kind, words, done.stderr))
+            for args in products if kind not in ("silent", "all closed") else ():  # who waits for a product may be slow
+                done = self.run_in(*args, **options)
+                self.assertEqual(done.returncode, 1, (kind, args, done.stderr))
+                self.assertEqual(len(done.stderr.splitlines()), 1, (kind, args, done.stderr))
                 self.assertIn(b"standard output: cannot be written", done.stderr)
         for name in ("new.h5", "m.h5", "t.furpack"):  # the files are there all the same
             self.assertEqual(self.run_in("furtable", "verify", name).returncode, 0)
@@ -371,8 +350,8 @@ class Outputs(unittest.TestCase):
 
     def test_file_size_limit_is_no_signal(self):
         limit = lambda: (signal.signal(signal.SIGXFSZ, signal.SIG_DFL), resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)))
-        for words in self.commands("new"):
-            self.refused(*words, parts=["new", "File too large"], preexec_fn=limit, restore_signals=False)
+        for args in self.commands("new"):
+            self.refused(*args, parts=["new", "File too large"], preexec_fn=limit, restore_signals=False)
 
     # --- file systems
 
@@ -385,16 +364,16 @@ class Outputs(unittest.TestCase):
         cannot = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTTY)
         for value in cannot:
             for options in (self.fake(FAKE_FSYNC_DIR=value), self.fake(FAKE_FSYNC_DIR=value, FAKE_FSYNC=value)):
-                for words in (*self.commands("new"), ["medulla-precompute", *SMALL, "-o", "new", "--progress", "none"]):
-                    done = self.run_in(*words, **options)
-                    self.assertEqual((done.returncode, done.stderr), (0, b""), (value, words))
+                for args in (*self.commands("new"), ["medulla-precompute", *SMALL, "-o", "new", "--progress", "none"]):
+                    done = self.run_in(*args, **options)
+                    self.assertEqual((done.returncode, done.stderr), (0, b""), (value, args))
                     os.remove(self.path("new"))
         for value in (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL):
             options = self.fake(FAKE_FLOCK=value)
-            for words in (["info", "t.h5"], ["verify", "t.h5"], ["diff", "t.h5", "t.furpack"], *self.commands("new")):
-                words = words if words[0] == "furtable" else ["furtable", *words]
-                done = self.run_in(*words, **options)
-                self.assertEqual((done.returncode, done.stderr), (0, b""), (value, words))
+            for args in (["info", "t.h5"], ["verify", "t.h5"], ["diff", "t.h5", "t.furpack"], *self.commands("new")):
+                args = args if args[0] == "furtable" else ["furtable", *args]
+                done = self.run_in(*args, **options)
+                self.assertEqual((done.returncode, done.stderr), (0, b""), (value, args))
             done = self.run_in("medulla-precompute", *SMALL, "-o", "new.h5", "--progress", "none", **options)
             self.assertEqual((done.returncode, len(done.stderr.splitlines())), (0, 1), done.stderr)
             self.assertIn(b"no locks", done.stderr)
@@ -403,8 +382,8 @@ class Outputs(unittest.TestCase):
     def test_what_was_lost_is_said(self):
         for value in (errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EINTR):
             for option in ("FAKE_FSYNC", "FAKE_FSYNC_DIR"):
-                for words in (*self.commands("new"), ["medulla-precompute", *SMALL, "-o", "new", "--progress", "none"]):
-                    self.refused(*words, parts=["brought to disk", os.strerror(value)], **self.fake(**{option: value}))
+                for args in (*self.commands("new"), ["medulla-precompute", *SMALL, "-o", "new", "--progress", "none"]):
+                    self.refused(*args, parts=["brought to disk", os.strerror(value)], **self.fake(**{option: value}))
                     shutil.rmtree(self.path("new.shards"), ignore_errors=True)
         self.assertEqual([n for n in os.listdir(self.folder.name) if ".tmp" in n], [])
 

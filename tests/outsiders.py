@@ -13,59 +13,38 @@ import shutil
 import struct
 import subprocess
 import sys
-import tempfile
 import unittest
 
 import h5py
 import numpy
 
+from support import runs
+from support.runs import CLEAN
+
 BIN, INCLUDE = os.path.abspath(sys.argv[1]), os.path.abspath(sys.argv[2])
 SMALL = ["--sigma-range", "0:4:2", "--g-range", "0:0.8:2", "--h-range", "0:1:3", "--theta-range", "0:90:3", "--bins", "36",
          "--threads", "1", "--progress", "none"]
-LAUNCHERS = ("SLURM_", "OMPI_", "PMI", "PALS_", "MV2_", "MVP_", "FLUX_", "JSM_", "ALPS_")
-CLEAN = {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHERS)}
 TABLES = {"azimuthal": ["sigma", "g", "h", "phi"], "longitudinal": ["sigma", "g", "theta_i", "side", "theta_r"]}
 VALUES = ["lobe", "energy", "energy_error", "standard_error", "mean_length"]
 
 
-class Outsiders(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.made = tempfile.TemporaryDirectory()
-        cls.good = os.path.join(cls.made.name, "t.h5")
-        done = subprocess.run([BIN + "/medulla-precompute", "-o", cls.good, *SMALL, "--compression", "none"],
-                              capture_output=True, env=CLEAN)
-        assert done.returncode == 0, done.stderr
-        assert subprocess.run([BIN + "/furtable", "compress", cls.good, "--rank", "4", "--solver", "als"],
-                              capture_output=True).returncode == 0
+class Outsiders(runs.WithFiles):
+    bin, job = BIN, [*SMALL, "--compression", "none"]
 
-    @classmethod
-    def tearDownClass(cls):
-        cls.made.cleanup()
-
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.path = lambda name: os.path.join(self.folder.name, name)
-        for name in ("t.h5", "t.furpack"):
-            shutil.copy(os.path.join(self.made.name, name), self.path(name))
-
-    def tearDown(self):
-        self.folder.cleanup()
-
-    def run_in(self, program, *words, env={}, timeout=120):
-        words = [w if isinstance(w, bytes) else str(w) for w in words]
-        done = subprocess.run([os.path.join(BIN, program), *words], cwd=self.folder.name, timeout=timeout, capture_output=True,
+    def run_in(self, program, *args, env={}, timeout=120):
+        args = [w if isinstance(w, bytes) else str(w) for w in args]
+        done = subprocess.run([os.path.join(BIN, program), *args], cwd=self.folder.name, timeout=timeout, capture_output=True,
                               env=dict(CLEAN, **env))
         return done.returncode, done.stdout, done.stderr
 
-    def good_run(self, *words, **options):
-        code, out, err = self.run_in(*words, **options)
-        self.assertEqual((code, err), (0, b""), words)
+    def good_run(self, *args, **options):
+        code, out, err = self.run_in(*args, **options)
+        self.assertEqual((code, err), (0, b""), args)
         return out
 
-    def fails(self, status, *words, parts=(), **options):
-        code, out, err = self.run_in(*words, **options)
-        self.assertEqual((code, out), (status, b""), (words, err))
+    def fails(self, status, *args, parts=(), **options):
+        code, out, err = self.run_in(*args, **options)
+        self.assertEqual((code, out), (status, b""), (args, err))
         self.assertEqual(len(err.strip().splitlines()), 1, err)
         for part in parts:
             self.assertIn(part if isinstance(part, bytes) else part.encode(), err)
@@ -93,11 +72,11 @@ class Outsiders(unittest.TestCase):
                                 (ranges, [f"{n}:{m}" for n in nonsense for m in ("1", n)] + ["0:nan", "0:0x1", "0:1:0x3", "0:1:nan",
                                                                                             "0:1:-1", "0:1:2.5", "0:1:3:4", ":"])):
             for program, options in programs.items():
-                for words, option in options:
-                    words = [w for i, w in enumerate(words) if option not in (w, words[i - 1] if i else None)]
+                for args, option in options:
+                    args = [w for i, w in enumerate(args) if option not in (w, args[i - 1] if i else None)]
                     for number in wrong:
                         for form in ([option, number], [f"{option}={number}"]):
-                            self.fails(2, program, *words, *form, parts=[option])
+                            self.fails(2, program, *args, *form, parts=[option])
         for option in ("--max-error", "--max-bytes", "--rank", "--sweeps"):
             for number in ("0", "-1", "-0"):
                 self.fails(2, "furtable", *compress, option, number, parts=[option])
@@ -106,19 +85,19 @@ class Outsiders(unittest.TestCase):
                 self.fails(2, "medulla-precompute", option, number, parts=[option])
         self.assertEqual(sorted(os.listdir(self.folder.name)), ["t.furpack", "t.h5"])
 
-    def test_numbers_that_are_some(self):
+    def test_valid_numbers(self):
         self.good_run("furtable", "compress", "t.h5", "--rank", "2", "--solver", "als", "--seed", 2 ** 64 - 1, "-o", "x.furpack")
         self.assertEqual(json.loads(self.good_run("furtable", "info", "x.furpack", "--json"))["provenance"]["seed"], 2 ** 64 - 1)
         for number in ("0.5", "+0.5", "5e-1", ".5"):
             self.good_run("furtable", "query", "t.h5", "--table", "azimuthal", "--sigma", 1, "--g", 0.3, "--h", number)
 
-    def test_empty_words_name_their_option(self):
-        for words, option in ((["-o", ""], "-o"), (["--output", ""], "--output"), (["--output="], "--output"), (["--scene", ""], "--scene"),
+    def test_empty_arguments_name_their_option(self):
+        for args, option in ((["-o", ""], "-o"), (["--output", ""], "--output"), (["--output="], "--output"), (["--scene", ""], "--scene"),
                               (["--scene="], "--scene"), (["--sigma-range="], "--sigma-range"), (["--shard", ""], "--shard")):
-            self.fails(2, "medulla-precompute", *words, parts=[option])
-        for words, option in ((["info", ""], "number 2"), (["compress", "t.h5", "-o", ""], "-o"), (["compress", "t.h5", "--output="], "--output"),
+            self.fails(2, "medulla-precompute", *args, parts=[option])
+        for args, option in ((["info", ""], "number 2"), (["compress", "t.h5", "-o", ""], "-o"), (["compress", "t.h5", "--output="], "--output"),
                               (["export", "t.furpack", "--format", "cpp", "--name=", "-o", "x"], "--name")):
-            self.fails(2, "furtable", *words, parts=[option])
+            self.fails(2, "furtable", *args, parts=[option])
 
     # --- launchers
 
@@ -150,14 +129,14 @@ class Outsiders(unittest.TestCase):
     def test_one_process_alone(self):
         """A batch script, which has SLURM_PROCID too; one rank; and who asks for it."""
         batch = {"SLURM_JOB_ID": "7", "SLURM_PROCID": "0", "SLURM_NTASKS": "16", "SLURM_NNODES": "2"}
-        for env, words in ((batch, []), ({"PMI_RANK": "0", "PMI_SIZE": "1"}, []),
+        for env, args in ((batch, []), ({"PMI_RANK": "0", "PMI_SIZE": "1"}, []),
                            ({"SLURM_STEP_ID": "4294967290", "SLURM_PROCID": "0", "SLURM_STEP_NUM_TASKS": "1"}, []),
                            ({"PMI_RANK": "2", "PMI_SIZE": "3"}, ["--shard", "none"]), ({"PMIX_RANK": "1"}, ["--shard", "none"])):
-            self.good_run("medulla-precompute", "-o", "new.h5", *SMALL, *words, env=env)
+            self.good_run("medulla-precompute", "-o", "new.h5", *SMALL, *args, env=env)
             self.good_run("furtable", "verify", "new.h5")
             os.remove(self.path("new.h5"))
 
-    def test_launchers_that_do_not_say_all(self):
+    def test_launchers_without_a_size(self):
         for env, parts in (({"PMIX_RANK": "1"}, ["PMIX_RANK", "--shard I/N"]), ({"PMI_RANK": "1"}, ["PMI_RANK", "PMI_SIZE"]),
                            ({"PALS_RANKID": "1", "PALS_LOCAL_SIZE": "4"}, ["PALS_RANKID", "PALS_SIZE"]),
                            ({"SLURM_STEP_ID": "0", "SLURM_PROCID": "1"}, ["SLURM_PROCID", "SLURM_STEP_NUM_TASKS"]),
@@ -172,12 +151,12 @@ class Outsiders(unittest.TestCase):
 
     def test_resume_names_the_option_that_differs(self):
         def variant(**changes):
-            words = list(SMALL)
+            args = list(SMALL)
             for option, value in changes.items():
                 option = "--" + option.replace("_", "-")
-                words = [*words, option, value] if option not in words else \
-                    [value if i and words[i - 1] == option else w for i, w in enumerate(words)]
-            return words
+                args = [*args, option, value] if option not in args else \
+                    [value if i and args[i - 1] == option else w for i, w in enumerate(args)]
+            return args
         jobs = {"--bins": variant(bins="40"), "--sigma-range": variant(sigma_range="0:5:2"), "--g-range": variant(g_range="0:0.8:3"),
                 "--h-range": variant(h_range="0:0.5:3"), "--theta-range": variant(theta_range="0:80:3"), "--seed": variant(seed="2"),
                 "--paths": variant(paths="77"), "--method": variant(method="deterministic"), "--target-error": variant(target_error="0.01"),
@@ -188,9 +167,9 @@ class Outsiders(unittest.TestCase):
                  "--target-error": ["0.01", "none"], "--absorption-range": ["0:1:2", "none"], "--table": ["azimuthal", "both"]}
         self.good_run("medulla-precompute", "-o", "part.h5", *SMALL, "--shard", "1/2")
         for output in ("t.h5", "part.h5"):
-            for option, words in jobs.items():
+            for option, args in jobs.items():
                 named = [o for o in jobs if o != option]
-                code, out, err = self.run_in("medulla-precompute", "-o", output, *words, "--resume")
+                code, out, err = self.run_in("medulla-precompute", "-o", output, *args, "--resume")
                 text = err.decode()
                 self.assertEqual((code, out, len(text.splitlines())), (1, b"", 1), text)
                 for part in ("another job", output, option + ": expected", *found.get(option, [])):
@@ -205,9 +184,9 @@ class Outsiders(unittest.TestCase):
         scene = {"materials": [{"name": "soft", "eta": 1.6, "kappa": 0.9, "sigma_ms": 1, "g": 0.1}]}
         with open(self.path("scene.json"), "w") as f:
             json.dump(scene, f)
-        words = [w if w != "0:0.8:2" else "0:0.8:5" for w in SMALL]
-        self.good_run("medulla-precompute", "-o", "s.h5", *words)
-        self.fails(1, "medulla-precompute", "-o", "s.h5", *words, "--scene", "scene.json", "--resume", parts=["--g-range: expected"])
+        args = [w if w != "0:0.8:2" else "0:0.8:5" for w in SMALL]
+        self.good_run("medulla-precompute", "-o", "s.h5", *args)
+        self.fails(1, "medulla-precompute", "-o", "s.h5", *args, "--scene", "scene.json", "--resume", parts=["--g-range: expected"])
 
     # --- names
 
@@ -308,18 +287,18 @@ class Outsiders(unittest.TestCase):
         self.good_run("furtable", "verify", file)
 
     def test_degenerate_axes(self):
-        """Whatever is written is read: by every command, of every axis that may be one node or lie at an end of its range."""
-        ranges = {"--sigma-range": ["0:0", "1000:1000", "1e-300:1e-300", "0:1e-6:2", "0:4:3"], "--g-range": ["0:0", "0.999:0.999", "-0.5:0:2"],
+        """Every file that is written can be read: by every command, of every axis that may be one node or lie at an end of its range."""
+        ranges = {"--sigma-range": ["0:0", "2:2", "1e-300:1e-300", "0:1e-6:2", "0:4:3"], "--g-range": ["0:0", "0.95:0.95", "-0.5:0:2"],
                   "--h-range": ["0:0", "1:1", "0:1:2"], "--theta-range": ["0:0", "90:90", "0:90:2"], "--bins": ["720", "8"]}
         every = [dict(zip(ranges, values)) for values in itertools.product(*ranges.values())]
         chosen = every[::11] + [dict(every[0], **{"--bins": bins}) for bins in ("720", "2048", "4096")]
         for k, options in enumerate(chosen):
-            words = [w for pair in options.items() for w in pair] + ["--method", "deterministic", "--progress", "none"]
+            args = [w for pair in options.items() for w in pair] + ["--method", "deterministic", "--progress", "none"]
             if k % 5 == 0:
-                words += ["--absorption-range", ("0:0", "0:1:2")[k % 2]]
+                args += ["--absorption-range", ("0:0", "0:1:2")[k % 2]]
             if k % 4:
-                words += ["--compression", ("zstd", "gzip", "none")[k % 3]]
-            self.good_run("medulla-precompute", "-o", "new.h5", *words, timeout=600)
+                args += ["--compression", ("zstd", "gzip", "none")[k % 3]]
+            self.good_run("medulla-precompute", "-o", "new.h5", *args, timeout=600)
             for command in ("info", "verify"):
                 self.good_run("furtable", command, "new.h5")
             self.good_run("furtable", "diff", "new.h5", "new.h5")
@@ -330,7 +309,7 @@ class Outsiders(unittest.TestCase):
                 self.good_run("furtable", "info", "new.furpack")
                 self.good_run("furtable", "export", "new.furpack", "--format", "glsl", "-o", "new.glsl")
             else:
-                self.assertEqual((code, len(err.splitlines())), (1, 1), (words, err))
+                self.assertEqual((code, len(err.splitlines())), (1, 1), (args, err))
         print(f"{len(chosen)} of {len(every)} combinations of axes")
 
     # --- packs as C++

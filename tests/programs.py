@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The programs as a user runs them: words, files, exit statuses, one line per error (docs/formats.md)."""
+"""The programs as a user runs them: arguments, files, exit statuses, one line per error (docs/formats.md)."""
 import json
 import math
 import os
@@ -16,8 +16,8 @@ SMALL = ["--sigma-range", "0:4:5", "--g-range", "0:0.6:3", "--h-range", "0:1:4",
          "--bins", "72", "--paths", "2000", "--progress", "none"]
 
 
-def run(program, *words, cwd=None):
-    done = subprocess.run([os.path.join(BIN, program), *map(str, words)], capture_output=True, text=True, cwd=cwd)
+def run(program, *args, cwd=None):
+    done = subprocess.run([os.path.join(BIN, program), *map(str, args)], capture_output=True, text=True, cwd=cwd)
     return done.returncode, done.stdout, done.stderr
 
 
@@ -35,9 +35,9 @@ class Programs(unittest.TestCase):
     def tearDownClass(cls):
         cls.folder.cleanup()
 
-    def fails(self, status, program, *words, names=()):
-        code, out, err = run(program, *words, cwd=self.folder.name)
-        self.assertEqual(code, status, (words, out, err))
+    def fails(self, status, program, *args, names=()):
+        code, out, err = run(program, *args, cwd=self.folder.name)
+        self.assertEqual(code, status, (args, out, err))
         self.assertEqual(len(err.strip().splitlines()), 1, err)
         self.assertEqual(out, "")
         for name in names:
@@ -48,11 +48,11 @@ class Programs(unittest.TestCase):
             self.assertEqual(run(program, "--help")[0], 0)
             self.assertRegex(run(program, "--version")[1], r"medulla \d+\.\d+\.\d+")
 
-    def test_wrong_words_are_status_2(self):
-        for words in (["--sigma-range", "2:1"], ["--sigma-range", "x"], ["--bins", "7"], ["--bins", "0"],
+    def test_wrong_arguments_are_status_2(self):
+        for args in (["--sigma-range", "2:1"], ["--sigma-range", "x"], ["--bins", "7"], ["--bins", "0"],
                       ["--g-range", "0:1"], ["--h-range", "0:2"], ["--theta-range", "0:91"], ["--table", "both!"],
                       ["--paths", "0"], ["--paths", "-5"], ["--paths", "34359738369"], ["--target-error", "1e-6"], ["--absorption-range", "-1:2"], ["--nonsense"], ["--method", "magic"], ["--threads", "-1"]):
-            self.fails(2, "medulla-precompute", "-o", self.path("never.h5"), *words, names=[words[0]])
+            self.fails(2, "medulla-precompute", "-o", self.path("never.h5"), *args, names=[args[0]])
             self.assertFalse(os.path.exists(self.path("never.h5")))
         self.fails(2, "furtable")
         self.fails(2, "furtable", "melt", "t.h5")
@@ -61,28 +61,28 @@ class Programs(unittest.TestCase):
         self.fails(2, "furtable", "query", "t.h5", "--table", "longitudinal", "--sigma", 1, "--g", 0.3, "--h", 0.1)
         self.fails(2, "furtable", "plot", "t.h5", "-o", "x.jpg")
 
-    def test_empty_words(self):
-        """CLI11 2.1 hangs on some of them (a find of fuzz/words.cpp)."""
-        for words in ([""], ["bcsdf", "", "-ai-th"], ["info", "t.h5", ""]):
-            self.fails(2, "furtable", *words, names=["empty word", f"number {words.index('') + 1}"])
-        self.fails(2, "medulla-precompute", "-o", "", names=["empty word", "number 2"])
+    def test_empty_arguments(self):
+        """CLI11 2.1 hangs on some of them (found by fuzz/options.cpp)."""
+        for args in ([""], ["bcsdf", "", "-ai-th"], ["info", "t.h5", ""]):
+            self.fails(2, "furtable", *args, names=["empty argument", f"number {args.index('') + 1}"])
+        self.fails(2, "medulla-precompute", "-o", "", names=["empty argument", "number 2"])
 
     def test_messages_speak_as_the_user_did(self):
-        """Ranges and degrees as they were typed; what there is in place of what there is not."""
-        for words, names in ((["--theta-range", "0:91"], ["degrees in [0, 90]", "found 91"]),
+        """Messages have ranges and degrees as on the command line, and name the valid choices."""
+        for args, names in ((["--theta-range", "0:91"], ["degrees in [0, 90]", "found 91"]),
                              (["--h-range", "0:2"], ["[0, 1]", "found 2"]),
                              (["--g-range", "-1:0.5"], ["[-0.999, 0.999]", "found -1"]),
                              (["--sigma-range", "0:2000"], ["[0, 1000]", "found 2000"]),
                              (["--absorption-range", "0:1001"], ["[0, 1000]", "found 1001"])):
-            self.fails(2, "medulla-precompute", *words, names=[words[0], *names])
+            self.fails(2, "medulla-precompute", *args, names=[args[0], *names])
         self.fails(1, "furtable", "query", "t.h5", "--table", "longitudinal", "--sigma", 1, "--g", 0.3, "--theta", 75,
                    names=["theta_i", "[0, 60] degrees", "found 75"])
-        for words in (["foo"], ["foo", "t.h5"]):
-            self.fails(2, "furtable", *words, names=["command", "info, compress", "presets", "found 'foo'"])
+        for args in (["foo"], ["foo", "t.h5"]):
+            self.fails(2, "furtable", *args, names=["command", "info, compress", "presets", "found 'foo'"])
         self.fails(2, "furtable", names=["info, compress", "found none"])
-        for words in (["export", "t.h5", "--format", "cpp", "-o", "x"],
+        for args in (["export", "t.h5", "--format", "cpp", "-o", "x"],
                       ["bcsdf", "--preset", "cat", "--theta-i", 1, "--theta-r", 1, "--phi", 1, "--far", "--pack", "t.h5"]):
-            self.fails(1, "furtable", *words, names=["t.h5: expected a pack", "found a tables file"])
+            self.fails(1, "furtable", *args, names=["t.h5: expected a pack", "found a tables file"])
         one = ["--sigma-range", "2:2", "--g-range", "0:0", "--h-range", "0:0", "--table", "azimuthal", "--bins", "36"]
         self.assertRegex(run("medulla-precompute", *one, "--dry-run")[1], r"1 cell x(.|\n)* 1 node,(.|\n)*1 slice, 1 cell:")
 
@@ -90,7 +90,7 @@ class Programs(unittest.TestCase):
         text = " ".join(run("medulla-precompute", "--help")[1].split())
         self.assertIn("relative L2 error of 0.001", text)
         self.assertIn("padded with zeros to a multiple of 8", run("furtable", "compress", "--help")[1])
-        self.assertRegex(run("furtable", "verify", "--help")[1], r"--max-dip FLOAT.*=0\.5")
+        self.assertRegex(run("furtable", "verify", "--help")[1], r"(?s)--max-dip FLOAT.*4 times the\s+error.*at\s+most 0\.5")
         info = run("furtable", "info", self.path("t.h5"))[1]
         self.assertIn("method auto: without paths, or with 2000", info)
         file = self.path("exact.h5")
@@ -98,27 +98,27 @@ class Programs(unittest.TestCase):
         self.assertNotIn("paths", run("furtable", "info", file)[1])
 
     def test_a_target_that_cannot_be_met_is_said(self):
-        """The slab's noise-free solver has no finer grids to go to."""
-        words = ["--sigma-range", "4:4", "--g-range", "0.99:0.99", "--theta-range", "0:80:3", "--bins", "72", "--table",
+        """The slab's noise-free solver cannot refine its grid."""
+        args = ["--sigma-range", "4:4", "--g-range", "0.99:0.99", "--theta-range", "0:80:3", "--bins", "72", "--table",
                  "longitudinal", "--method", "deterministic", "--target-error", "1e-5", "--progress", "none"]
-        status, out, err = run("medulla-precompute", "-o", self.path("target.h5"), *words, "--json")
+        status, out, err = run("medulla-precompute", "-o", self.path("target.h5"), *args, "--json")
         self.assertEqual((status, err), (0, ""))
         table = json.loads(out)["tables"]["longitudinal"]
         self.assertEqual(table["cells"], 6)
         self.assertGreater(table["cells_above_target"], 0)
         self.assertGreater(table["worst_standard_error"], 1e-5)
-        status, out, err = run("medulla-precompute", "-o", self.path("target.h5"), *words)
+        status, out, err = run("medulla-precompute", "-o", self.path("target.h5"), *args)
         self.assertIn(f"longitudinal: {table['cells_above_target']} of 6 cells did not reach 1e-05", out)
 
     def test_bounds_of_compress(self):
-        """--max-bytes names the least size there is; non-negative packs keep --max-error themselves."""
+        """--max-bytes names the smallest possible size; --max-error bounds the error of non-negative packs, not of factors."""
         code, out, err = run("furtable", "compress", self.path("t.h5"), "--max-bytes", 1000, "-o", self.path("b.furpack"))
         self.assertEqual((code, out), (1, ""))
         least = int(re.search(r"expected at least (\d+) .*found 1000", err).group(1))
-        words = ["compress", self.path("t.h5"), "-o", self.path("b.furpack"), "--max-bytes"]
-        self.assertEqual(run("furtable", *words, least)[0], 0)
+        args = ["compress", self.path("t.h5"), "-o", self.path("b.furpack"), "--max-bytes"]
+        self.assertEqual(run("furtable", *args, least)[0], 0)
         self.assertEqual(os.path.getsize(self.path("b.furpack")), least)
-        self.fails(1, "furtable", *words, least - 1, names=[str(least), str(least - 1)])
+        self.fails(1, "furtable", *args, least - 1, names=[str(least), str(least - 1)])
         for bound in (0.2, 0.06):
             code, out, err = run("furtable", "compress", self.path("t.h5"), "--nonnegative", "--max-error", bound, "-o",
                                  self.path("b.furpack"), "--json")
@@ -128,7 +128,7 @@ class Programs(unittest.TestCase):
                 self.assertLessEqual(error["relative_l2"], bound)
                 factors = report["factors"][kind]
                 stated = math.hypot(factors["relative_l2_in_pack"], factors["relative_l2_of_rounding"])
-                # Rounding is stated in the metric of the solver, the bins' but for the condition of B-splines: too much.
+                # The stated rounding is in the metric of the solver, which differs by the condition of B-splines: an upper bound.
                 self.assertLess(0.99 * factors["relative_l2_in_pack"], error["relative_l2"])
                 self.assertLess(error["relative_l2"], 1.01 * stated)
 
@@ -192,11 +192,11 @@ class Programs(unittest.TestCase):
         self.fails(2, "furtable", "export", "t.furpack", "--format", "cpp", "--name", "1x", "-o", "x.hpp", names=["1x"])
 
     def test_time_budget_betters_what_is_coarse(self):
-        words = SMALL[:-4] + ["--progress", "none", "--json"]
+        args = SMALL[:-4] + ["--progress", "none", "--json"]
         worst = []
-        # How much is enough depends on the machine: a busy one under a sanitizer needs many times what a quiet one does.
+        # The time needed depends on the machine: a busy one under a sanitizer needs many times that of a quiet one.
         for seconds in ("1e-9", "1.5", "15", "150"):
-            status, out, err = run("medulla-precompute", "-o", self.path(f"b{seconds}.h5"), *words, "--time-budget",
+            status, out, err = run("medulla-precompute", "-o", self.path(f"b{seconds}.h5"), *args, "--time-budget",
                                    seconds)
             self.assertEqual(status, 0, err)
             worst.append(max(t["worst_standard_error"] for t in json.loads(out)["tables"].values()))
@@ -210,18 +210,18 @@ class Programs(unittest.TestCase):
         with open(scene, "w") as f:
             json.dump({"materials": [{"name": "soft", "eta": 1.6, "kappa": 0.9, "sigma_ms": 1, "g": 0.1},
                                      {"name": "hair", "kappa": 0}]}, f)
-        words = ["--sigma-range", "0:9:12", *SMALL[2:]]
-        status, out, err = run("medulla-precompute", "--scene", scene, "--dry-run", "--json", *words)
+        args = ["--sigma-range", "0:9:12", *SMALL[2:]]
+        status, out, err = run("medulla-precompute", "--scene", scene, "--dry-run", "--json", *args)
         self.assertEqual(status, 0, err)
         plan = json.loads(out)
         self.assertLess(plan["share_of_whole"], 1)
         self.assertGreater(plan["seconds"], 0)
         sigma = plan["tables"]["azimuthal"]["sigma"]
-        self.assertLess(sigma[1], 0.9)                             # sigma_ms kappa, and one node more
+        self.assertLess(sigma[1], 0.9)                             # sigma_ms kappa, and one more node
         self.assertGreater(sigma[-2], 0.9 / math.sqrt(1 - 1 / 1.6 ** 2))
-        self.assertEqual(run("medulla-precompute", "--scene", scene, "-o", self.path("scene.h5"), *words)[0], 0)
-        self.assertEqual(run("medulla-precompute", "-o", self.path("whole.h5"), *words)[0], 0)
-        # The whole table holds the scene's cells byte for byte, so that merging them adds nothing.
+        self.assertEqual(run("medulla-precompute", "--scene", scene, "-o", self.path("scene.h5"), *args)[0], 0)
+        self.assertEqual(run("medulla-precompute", "-o", self.path("whole.h5"), *args)[0], 0)
+        # The complete table has the scene's cells byte for byte, so that merging them changes nothing.
         self.assertEqual(run("furtable", "merge", self.path("scene.h5"), self.path("whole.h5"), "-o",
                              self.path("merged.h5"))[0], 0)
         hashes = [json.loads(run("furtable", "info", self.path(name), "--json")[1])["sha256"]
@@ -272,7 +272,7 @@ class Programs(unittest.TestCase):
             rows = [tuple(map(float, line.split(","))) for line in lines[1:]]
             self.assertEqual(len(rows), 72)
             energy = sum(d for _, d in rows) * 2 * math.pi / 72
-            # Below 1 only by what the pack's dips below zero add; `furtable verify` prints that figure.
+            # Differs from 1 only by the pack's negative undershoot, which `furtable verify` prints.
             self.assertAlmostEqual(energy / (1 - math.exp(-2.4 * math.sqrt(0.75))), 1, delta=1e-2)
             code, out, err = run("furtable", "query", self.path(file), "--table", "longitudinal", "--sigma", 1.2, "--g", 0.3,
                                  "--theta", 20, "--json")
@@ -333,7 +333,7 @@ class Programs(unittest.TestCase):
             self.assertIn("azimuthal", info["tables"])
         diff = json.loads(run("furtable", "diff", self.path("t.h5"), self.path("t.furpack"), "--json")[1])
         errors = diff["errors"]
-        for error in errors.values():  # nothing is claimed below the table's noise
+        for error in errors.values():  # no error below the noise of the table is claimed
             self.assertGreater(error["noise"], 0)
             self.assertGreaterEqual(error["relative_l2_with_noise"], max(error["noise"], error["relative_l2"]))
         verified = json.loads(run("furtable", "verify", self.path("t.furpack"), "--json")[1])[self.path("t.furpack")]
@@ -342,7 +342,7 @@ class Programs(unittest.TestCase):
         self.assertEqual(set(errors), {"azimuthal", "longitudinal back", "longitudinal forward"})
         same = json.loads(run("furtable", "diff", self.path("t.h5"), self.path("t.h5"), "--json")[1])["errors"]
         self.assertEqual(max(e["relative_l2"] for e in same.values()), 0)
-        other = ["50" if word == "72" else word for word in SMALL]
+        other = ["50" if arg == "72" else arg for word in SMALL]
         self.assertEqual(run("medulla-precompute", "-o", self.path("bins.h5"), *other)[0], 0)
         self.fails(1, "furtable", "diff", "t.h5", "bins.h5", names=["t.h5", "bins.h5", "72 bins", "50"])
         import numpy
@@ -353,8 +353,8 @@ class Programs(unittest.TestCase):
 
     def test_plot(self):
         """gnuplot draws: three formats, the same bytes twice, names and units, one line where something is missing."""
-        def plot(output, *words, **more):
-            return subprocess.run([os.path.join(BIN, "furtable"), "plot", *words, "-o", self.path(output)],
+        def plot(output, *args, **more):
+            return subprocess.run([os.path.join(BIN, "furtable"), "plot", *args, "-o", self.path(output)],
                                   capture_output=True, text=True, errors="replace", cwd=self.folder.name, **more)
 
         def bytes_of(name):
@@ -393,7 +393,7 @@ class Programs(unittest.TestCase):
         for at in ("1", "1:", "1:0.5:2", "x:1", "nan:0.5", ""):
             self.fails(2, "furtable", "plot", "t.h5", "-o", "x.svg", "--at=" + at, names=["--at"])
         # Without gnuplot, and with one that fails.
-        for path, words in (("/nonexistent", "gnuplot"), (self.path("bin"), "gnuplot failed: no luck")):
+        for path, args in (("/nonexistent", "gnuplot"), (self.path("bin"), "gnuplot failed: no luck")):
             os.makedirs(self.path("bin"), exist_ok=True)
             with open(self.path("bin/gnuplot"), "w") as f:
                 f.write("#!/bin/sh\necho no luck >&2\nexit 3\n")
@@ -401,11 +401,11 @@ class Programs(unittest.TestCase):
             done = plot("none.svg", "t.h5", env={**os.environ, "PATH": path})
             self.assertEqual((done.returncode, done.stdout), (1, ""), done)
             self.assertEqual(len(done.stderr.strip().splitlines()), 1, done.stderr)
-            self.assertIn(words, done.stderr)
+            self.assertIn(args, done.stderr)
             self.assertFalse(os.path.exists(self.path("none.svg")))
 
     def test_glsl(self):
-        """Its words are the pack's, and GLSL's own compiler takes it; tests/glsl_values.cpp compares its numbers."""
+        """Its array has the words of the pack, and the reference compiler accepts it; glsl_values.cpp compares its numbers."""
         file = self.path("fur.glsl")
         self.assertEqual(run("furtable", "export", self.path("t.furpack"), "--format", "glsl", "--name", "fox", "-o", file)[0], 0)
         with open(file) as f:
@@ -438,11 +438,11 @@ class Programs(unittest.TestCase):
             self.assertNotIn("WARNING", done.stdout)
 
     def test_axis_of_absorption(self):
-        words = ["--table", "azimuthal", "--absorption-range", "0:2:4", *SMALL]
+        args = ["--table", "azimuthal", "--absorption-range", "0:2:4", *SMALL]
         file, pack = self.path("absorb.h5"), self.path("absorb.furpack")
         for share in (1, 2):
-            self.assertEqual(run("medulla-precompute", "-o", self.path("shares.h5"), "--shard", f"{share}/2", *words)[0], 0)
-        self.assertEqual(run("medulla-precompute", "-o", file, *words)[0], 0)
+            self.assertEqual(run("medulla-precompute", "-o", self.path("shares.h5"), "--shard", f"{share}/2", *args)[0], 0)
+        self.assertEqual(run("medulla-precompute", "-o", file, *args)[0], 0)
         self.assertEqual(run("furtable", "merge", self.path("shares.h5.shards"), "-o", self.path("merged.h5"))[0], 0)
         tables = [json.loads(run("furtable", "info", f, "--json")[1]) for f in (file, self.path("merged.h5"))]
         self.assertEqual(tables[0]["sha256"], tables[1]["sha256"])
@@ -473,7 +473,7 @@ class Programs(unittest.TestCase):
         errors = json.loads(run("furtable", "diff", file, pack, "--json")[1])["errors"]["azimuthal"]
         self.assertLess(errors["relative_l2"], 0.02)
         self.assertLess(errors["survival_error"], 2e-3)
-        # Without the axis: the same lobes at absorption 0, and no answer above it.
+        # Without the axis: the same lobes at absorption 0, and an error above it.
         plain = json.loads(run("furtable", "diff", self.path("t.h5"), file, "--json")[1])["errors"]["azimuthal"]
         self.assertEqual(plain["relative_l2"], 0)
         self.fails(1, "furtable", "diff", file, self.path("t.h5"), names=["absorption"])
@@ -495,8 +495,8 @@ class Programs(unittest.TestCase):
         self.assertEqual([line.split()[0] for line in text[2:]], [p["name"] for p in presets])
         where = ["--theta-i", 20, "--theta-r", -15, "--phi", 170]
 
-        def lobes(*words):
-            status, out, err = run("furtable", "bcsdf", *words, "--json")
+        def lobes(*args):
+            status, out, err = run("furtable", "bcsdf", *args, "--json")
             self.assertEqual((status, err), (0, ""))
             answer = json.loads(out)
             self.assertEqual(list(answer["lobes"]), ["R", "TT", "TRT", "TTs", "TRTs"])
@@ -515,7 +515,7 @@ class Programs(unittest.TestCase):
         with open(material, "w") as f:
             json.dump({k: v for k, v in presets[1].items()}, f)
         same = lobes("--material", material, *where, "--h", 0.3)
-        for name, lobe in same["lobes"].items():  # a degree to a radian is rounded once more
+        for name, lobe in same["lobes"].items():  # with one more rounding from degrees to radians
             self.assertAlmostEqual(lobe["value"], cat["lobes"][name]["value"], delta=1e-5 * (1 + lobe["value"]))
         with open(material, "w") as f:
             json.dump({"preset": "cat", "sigma_ca": [0.06, 0.5, 2], "fresnel": "exact"}, f)
@@ -534,7 +534,7 @@ class Programs(unittest.TestCase):
         for grazing in (90, -90, 89.9999999):
             self.fails(2, "furtable", "bcsdf", "--preset", "cat", "--theta-i", grazing, *where[2:], "--far",
                        names=["--theta-i", "(-90, 90)", f"{grazing:g}"])
-        # Whole turns count for nothing, however many.
+        # Full turns have no effect, however many.
         turned = ["--theta-i", 20, "--theta-r", -15, "--phi", 170 + 360 * 10 ** 9]
         self.assertEqual(lobes("--preset", "cat", *turned, "--far"), lobes("--preset", "cat", *where, "--far"))
         self.fails(1, "furtable", "bcsdf", "--material", "none.json", *where, "--far", names=["none.json"])
@@ -549,18 +549,18 @@ class Programs(unittest.TestCase):
             with open(material, "w") as f:
                 json.dump({field: value}, f)
             self.fails(1, "furtable", "bcsdf", "--material", material, *where, "--far", names=[f"/{field}: expected", *names])
-        # Beyond the pack's axes their ends hold, which is said.
+        # Outside the pack's axes values are clamped, with a warning.
         ranges = {"sigma": "[0, 4]", "g": "[0, 0.6]"}
         for field, value, axis in (("sigma_ms", 9, "sigma"), ("g", 0.7, "g")):
             with open(material, "w") as f:
                 json.dump({"preset": "cat", field: value}, f)
-            words = ["bcsdf", "--material", material, *where, "--far", "--json"]
-            code, out, err = run("furtable", *words, "--pack", self.path("t.furpack"))
+            args = ["bcsdf", "--material", material, *where, "--far", "--json"]
+            code, out, err = run("furtable", *args, "--pack", self.path("t.furpack"))
             self.assertEqual((code, len(err.splitlines())), (0, 1), err)
             for part in ("warning", "t.furpack", f"{axis} expected in {ranges[axis]}, found "):
                 self.assertIn(part, err)
             self.assertGreater(json.loads(out)["lobes"]["TTs"]["value"], 0)
-            self.assertEqual(run("furtable", *words)[2], "")  # the default pack's axes are longer
+            self.assertEqual(run("furtable", *args)[2], "")  # the default pack's axes are longer
 
     def test_no_temporary_file_is_left(self):
         self.assertEqual([name for name in os.listdir(self.folder.name) if ".tmp" in name], [])

@@ -12,6 +12,7 @@ ROOMS = {
     "sim2d/slab": {"sim2d"},
     "sim2d/reference": {"sim2d", "sim2d/slab"},
     "sim2d/tracer": {"sim2d", "sim2d/disc", "sim2d/slab"},
+    "sim3d": {"runtime/include/medulla", "sim2d", "sim2d/tracer"},
     "tensor": set(),
     "plot": set(),
     "tables": set(),
@@ -52,7 +53,7 @@ def main():
             if other not in below(room):
                 wrong.append(f"{path} includes {target}")
     print(f"{includes} includes between rooms")
-    if wrong or includes < 100:  # none at all would mean that the rooms above are not where they were
+    if wrong or includes < 100:  # fewer if the list of rooms above is out of date
         sys.exit("\n".join(wrong) or "expected at least 100 includes")
 
 

@@ -14,18 +14,20 @@ using namespace medulla::tables;
 
 namespace {
 
-/// Small noise-free versions of both tables.
+/// Both tables with few nodes on the axes of sigma, h and theta_i.
+Tables noise_free(std::size_t nodes, const Range& g, std::size_t bins) {
+    Request request = default_request();
+    request.method = Method::deterministic;
+    request.sigma = graded_axis("sigma", {0, 4, nodes});
+    request.g = graded_axis("g", g);
+    request.h = graded_axis("h", {0, 1, nodes});
+    request.theta_i = graded_axis("theta_i", {0, pi / 2, nodes});
+    request.bins = bins;
+    return simulate(request, ProgressMode::none);
+}
+
 const Tables& small_tables() {
-    static const Tables tables = [] {
-        Request request = default_request();
-        request.method = Method::deterministic;
-        request.sigma = graded_axis("sigma", {0, 4, 6});
-        request.g = graded_axis("g", {0, 0.7, 4});
-        request.h = graded_axis("h", {0, 1, 6});
-        request.theta_i = graded_axis("theta_i", {0, pi / 2, 6});
-        request.bins = 180;
-        return simulate(request, ProgressMode::none);
-    }();
+    static const Tables tables = noise_free(6, {0, 0.7, 4}, 180);
     return tables;
 }
 
@@ -202,4 +204,63 @@ TEST_CASE("No error is claimed below the noise of the table", "[compress]") {
     CHECK(result.errors[0].worst_claim >= result.errors[0].claim);
     // The pack stores the noise.
     CHECK(pack_source(result.pack, "test")->noise(TableKind::azimuthal, {}) == Approx(0.05).epsilon(1e-6));
+}
+
+namespace {
+
+/// 4 x 3 x 4 nodes of 36 bins: a part has 48 fibres along its exit axis, and so at most 48 components.
+const Tables& smallest_tables() {
+    static const Tables tables = noise_free(4, {0, 0.8, 3}, 36);
+    return tables;
+}
+
+}  // namespace
+
+TEST_CASE("A pack has no more components than its table can have, or than the error of its exit splines justifies",
+          "[compress]") {
+    for (const std::size_t bytes : {20000u, 40000u, 153600u, 100000000u}) {
+        CAPTURE(bytes);
+        CompressOptions options;
+        options.max_bytes = bytes;
+        const CompressResult result = compress(smallest_tables(), options, "test");
+        CHECK(result.pack.size() <= bytes);
+        for (const TableReport& report : result.tables) {
+            double components = report.fit_error * report.fit_error - report.exit_error * report.exit_error;
+            for (const PartReport& part : report.parts) {
+                CHECK(part.rank <= (is_lobe(report.kind) ? 48 : 12));
+                // A part at its most components needs no solve.
+                CHECK(part.solve.iterations <= 300);
+            }
+            // At most_rank only the error of the exit splines is left; below it, components add at most a quarter of
+            // that.
+            if (is_lobe(report.kind) && bytes >= 40000)
+                CHECK(components <= 1.5 * report.exit_error * report.exit_error / 16);
+        }
+    }
+}
+
+TEST_CASE("A rank beyond the most of a table is reduced to it, and exact except for the exit splines", "[compress]") {
+    for (const tensor::Solver solver : {tensor::Solver::lm, tensor::Solver::als, tensor::Solver::nonnegative}) {
+        CompressOptions options;
+        options.rank = 256;
+        options.solver = solver;
+        const CompressResult result = compress(smallest_tables(), options, "test");
+        for (const TableReport& report : result.tables) {
+            if (!is_lobe(report.kind)) continue;
+            for (const PartReport& part : report.parts) {
+                CHECK(part.rank <= 6 * 48 / 6);
+                CHECK(part.solve.solver == "fibres");
+                if (solver != tensor::Solver::nonnegative) CHECK(part.solve.relative_error < 2e-7);
+            }
+        }
+    }
+}
+
+TEST_CASE("--max-error of a small table is reached with at most most_rank components, or refused", "[compress]") {
+    CompressOptions options;
+    options.max_error = 0.02;
+    const CompressResult result = compress(smallest_tables(), options, "test");
+    for (const LobeError& error : result.errors) CHECK(error.relative <= 0.02);
+    options.max_error = 1e-9;  // below the error of the exit splines
+    CHECK_THROWS_WITH(compress(smallest_tables(), options, "test"), Catch::Contains("--max-error"));
 }

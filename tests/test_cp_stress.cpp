@@ -327,3 +327,40 @@ TEST_CASE("the fast solvers give the same bytes for 1, 2 and 5 threads", "[cp][s
         }
     }
 }
+
+TEST_CASE("Ranks that no tensor of a shape needs are reduced, exactly, and the report says so", "[cp][stress]") {
+    CHECK(most_components({7}) == 1);
+    CHECK(most_components({4, 3, 4, 18}) == 48);
+    CHECK(most_components({18, 4, 3, 4}) == 48);
+    CHECK(most_components({1u << 20, 1u << 20, 1u << 20, 1u << 20}) == std::numeric_limits<int>::max());
+    for (const std::vector<std::size_t>& shape :
+         std::vector<std::vector<std::size_t>>{{1}, {6}, {5, 4}, {3, 4, 5}, {5, 1, 4}, {4, 3, 4, 18}, {3, 2, 4, 2, 3}})
+        for (const double scale : {1.0, 0x1p-560, 0x1p560}) {  // 1e-169 and 1e169: their squares are no doubles
+            Tensor x = random_tensor(shape, 21);
+            for (double& value : x.values) value *= scale;
+            for (const Solver solver : {Solver::als, Solver::lm, Solver::nonnegative}) {
+                CpOptions options;
+                options.rank = std::numeric_limits<int>::max();
+                const CpResult result = cp(x, solver, options);
+                CAPTURE(shape.size(), scale, summary(result.report));
+                const int most = most_components(shape);
+                check_whole(x, result, result.model.rank());
+                CHECK(result.model.rank() <= most);
+                CHECK(result.report.spare == options.rank - result.model.rank());
+                CHECK_THAT(summary(result.report), Catch::Contains(std::to_string(result.report.spare) + " of the"));
+                if (solver != Solver::nonnegative) CHECK(result.report.relative_error < 1e-13);
+                Tensor below = x;  // the part that factors >= 0 cannot represent
+                for (double& value : below.values) value = std::min(value, 0.0);
+                if (solver == Solver::nonnegative)
+                    CHECK(result.report.relative_error == Approx(norm(below) / norm(x)).epsilon(1e-12).margin(1e-14));
+                // One component less needs a solve.
+                options.rank = most - 1;
+                if (most > 1 && scale == 1) CHECK(cp(x, solver, options).report.solver != "fibres");
+            }
+        }
+    Tensor bad = random_tensor({4, 3}, 22);
+    bad({2, 1}) = std::nan("");
+    CpOptions options;
+    options.rank = 100;
+    CHECK_THROWS_WITH(cp(bad, Solver::lm, options), Catch::Contains("[2, 1]"));
+}

@@ -5,6 +5,8 @@
 
 #include "medulla/medulla.hpp"
 #include "tables/pack/writer.hpp"
+#include "tests/support/analytic_pack.hpp"
+#include "tests/support/exercise_pack.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;
@@ -246,8 +248,49 @@ TEST_CASE("Each defect of a pack is refused with its own status", "[pack]") {
     CHECK(status_after([&](auto& b) { poke(b, layout.axes[0].knots_offset, INFINITY); }) == PackStatus::bad_knots);
     CHECK(status_after([&](auto& b) { poke(b, layout.axes[0].knots_offset + 2 * sizeof(Knot<float>), -5.0f); }) ==
           PackStatus::bad_knots);
-    for (int s = 0; s <= static_cast<int>(PackStatus::out_of_bounds); ++s)
+    CHECK(status_after([&](auto& b) { poke(b, layout.integrals_offset, 3e5f); }) == PackStatus::bad_number);
+    CHECK(status_after([&](auto& b) { poke(b, axis + offsetof(PackAxis, reserved), 1u); }) == PackStatus::bad_reserved);
+    CHECK(status_after([](auto& b) { poke(b, offsetof(PackHeader, reserved) + 16, 1u); }) == PackStatus::bad_reserved);
+    for (int s = 0; s <= static_cast<int>(PackStatus::big_endian); ++s)
         CHECK(std::string(describe(static_cast<PackStatus>(s))) != "unknown status");
+}
+
+TEST_CASE("Axes are refused from where differences of knots, their reciprocals or scales are not normal floats",
+          "[pack]") {
+    const auto status_of = [](double factor) {
+        analytic::TableSpec spec = analytic::azimuthal_table(3);
+        for (double& t : spec.axes[0].breakpoints) t *= factor;
+        spec.axes[0].factor = [](int, double) { return 1.0; };
+        analytic::PackBuilder builder;
+        builder.add(spec);
+        const std::vector<unsigned char> bytes = builder.bytes();
+        const OpenResult opened = open_pack(bytes.data(), bytes.size());
+        if (opened.status == PackStatus::ok) {
+            CHECK(testing::exercise(opened.pack) == "");
+            const AxisView<float> axis = opened.pack[TableKind::azimuthal].axis(0);
+            CHECK(std::isfinite(index_axis(axis).scale));
+        }
+        return opened.status;
+    };
+    // 24 spans of the axis are [0, 4]: the shortest is 1/6.
+    CHECK(status_of(1) == PackStatus::ok);
+    CHECK(status_of(0x1p-97) == PackStatus::ok);
+    CHECK(status_of(0x1p97) == PackStatus::ok);
+    for (const int power : {-98, -110, -120, -123, -125, -130, 98, 110, 120, 125}) {
+        CAPTURE(power);
+        CHECK(status_of(std::ldexp(1.0, power)) == PackStatus::bad_knots);
+    }
+    // One span narrower than the rest, down to denormals.
+    for (const double narrow : {1e-31, 1e-37, 1e-38, 1e-40, 1.5e-45}) {
+        analytic::TableSpec spec = analytic::azimuthal_table(3);
+        spec.axes[0].breakpoints = {0, narrow, 1, 2, 4};
+        spec.axes[0].factor = [](int, double) { return 1.0; };
+        analytic::PackBuilder builder;
+        builder.add(spec);
+        const std::vector<unsigned char> bytes = builder.bytes();
+        CAPTURE(narrow);
+        CHECK(open_pack(bytes.data(), bytes.size()).status == PackStatus::bad_knots);
+    }
 }
 
 TEST_CASE("Every changed byte of a pack is detected", "[pack]") {
@@ -275,7 +318,7 @@ TEST_CASE("Mutated packs with a valid checksum give finite numbers and never rea
         if (opened.status != PackStatus::ok || !opened.pack[TableKind::azimuthal]) continue;  // a pack may be empty
         ++opened_count;
         // Reads stay inside the pack, which the address sanitizer checks.
-        CHECK(std::isfinite(azimuthal(opened.pack, 1.5f, 0.3f, 0.2f, 1.0f)));
+        CHECK(testing::exercise(opened.pack) == "");
     }
     CHECK(opened_count > 0);
 }

@@ -47,6 +47,19 @@ TEST_CASE("The same seed gives the same values for 1, 2 and 5 threads, another s
     }
 }
 
+TEST_CASE("Axes that begin at -0 and at 0 are the same job, values and bytes", "[tables]") {
+    for (const Method method : {Method::analog, Method::mc}) {
+        Request request = small_request(method);
+        const Tables plus = simulate(request, ProgressMode::none);
+        request.sigma.values[0] = request.g.values[0] = request.h.values[0] = request.theta_i.values[0] = -0.0;
+        const Tables minus = simulate(request, ProgressMode::none);
+        check_same(*plus.azimuthal, *minus.azimuthal);
+        check_same(*plus.longitudinal, *minus.longitudinal);
+    }
+    for (const double end : {parse_range("-0:1", "--g-range", 3).low, parse_range("-1:-0", "--g-range", 3).high})
+        CHECK_FALSE(std::signbit(end));
+}
+
 TEST_CASE("A cell's values do not depend on the table around it", "[tables]") {
     const Tables whole = simulate(small_request(Method::mc), ProgressMode::none);
     Request part = small_request(Method::mc);

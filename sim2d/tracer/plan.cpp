@@ -15,7 +15,7 @@ TracerPlan plan_of(const TracerCell& cell) {
     plan.forced = 8;
     plan.keep = 0.3f;
     // A deposit costs as much as about twenty scatterings. In thin media there are few vertices, and roulette would
-    // spoil the lattice; in thick media the variance is that of the paths, whatever share of their vertices deposits.
+    // spoil the lattice; in thick media the variance is that of the paths, for any share of vertices that deposit.
     plan.roulette = static_cast<float>(std::clamp(0.15 * std::pow(cell.sigma, 0.7), 1e-6, 0.5 + 0.5 * gap));
     // With a peaked phase function most light leaves straight on.
     plan.turned = static_cast<float>(std::max(0.07, 0.5 * gap));

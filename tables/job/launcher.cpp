@@ -11,14 +11,14 @@ namespace {
 
 using Variables = std::function<const char*(const char*)>;
 
-/// Where a launcher says the rank of a process, and of how many: the first of the sizes that is there.
+/// Variables of a launcher for the rank of a process and the number of ranks, of which the first that is set counts.
 struct Launcher {
     const char* rank;
     std::array<const char*, 2> sizes;
 };
 
-/// MPI's own come before Slurm's: an mpirun within a Slurm job starts one of its helpers on each node by srun, whose
-/// SLURM_PROCID its ranks inherit.
+/// MPI before Slurm: within a Slurm job, mpirun starts a helper on each node by srun, and its ranks inherit the
+/// helper's SLURM_PROCID.
 constexpr Launcher launchers[] = {
     {"OMPI_COMM_WORLD_RANK", {"OMPI_COMM_WORLD_SIZE", nullptr}},  // Open MPI, Spectrum MPI
     {"MV2_COMM_WORLD_RANK", {"MV2_COMM_WORLD_SIZE", nullptr}},    // MVAPICH2
@@ -28,8 +28,8 @@ constexpr Launcher launchers[] = {
     {"JSM_NAMESPACE_RANK", {"JSM_NAMESPACE_SIZE", nullptr}},      // IBM jsrun
     {"FLUX_TASK_RANK", {"FLUX_JOB_SIZE", nullptr}},
     {"SLURM_PROCID", {"SLURM_STEP_NUM_TASKS", "SLURM_NTASKS"}},
-    {"PMIX_RANK", {"PMIX_SIZE", nullptr}},        // PRRTE's prun: the standard names no variable for the size
-    {"ALPS_APP_PE", {"ALPS_APP_SIZE", nullptr}},  // Cray aprun, which names none either
+    {"PMIX_RANK", {"PMIX_SIZE", nullptr}},        // PRRTE's prun; the standard defines no variable for the size
+    {"ALPS_APP_PE", {"ALPS_APP_SIZE", nullptr}},  // Cray aprun, which has none either
 };
 
 std::uint32_t number(const Variables& variable, const char* name, std::optional<std::uint32_t> absent = std::nullopt) {
@@ -43,8 +43,7 @@ std::uint32_t number(const Variables& variable, const char* name, std::optional<
     return value;
 }
 
-/// A job's batch script has SLURM_PROCID 0 and the job's SLURM_NTASKS, though it is one process: only srun makes a
-/// step.
+/// A batch script has SLURM_PROCID 0 and the job's SLURM_NTASKS, but is a single process; only srun starts a step.
 bool is_rank(const Launcher& launcher, const Variables& variable) {
     if (!variable(launcher.rank)) return false;
     const bool slurm = launcher.rank == std::string("SLURM_PROCID");
@@ -71,7 +70,7 @@ std::optional<Launched> rank(const Variables& variable) {
         for (const char* name : launcher.sizes)
             if (name && !size_name && variable(name)) size_name = name;
         if (!size_name)
-            throw Error("{}: expected the number of ranks beside it in {}, found none; say --shard I/N or --shard none",
+            throw Error("{}: expected the number of ranks beside it in {}, found none; use --shard I/N or --shard none",
                         launcher.rank, launcher.sizes[0]);
         const std::uint32_t index = number(variable, launcher.rank), size = number(variable, size_name);
         if (index >= size || size > most_workers)

@@ -1,4 +1,4 @@
-// Which worker of how many a process is, from what the launcher of a cluster put into its environment.
+// The worker share of a process, from the environment variables of a cluster's launcher.
 #pragma once
 
 #include <functional>
@@ -14,12 +14,11 @@ struct Launched {
     std::string from;  ///< "PMI_RANK and PMI_SIZE"
 };
 
-/// The share that a launcher means for this process: the rank of an MPI launcher (Open MPI, MVAPICH, PALS, MPICH, Intel
-/// MPI), of jsrun, of Flux, or of a Slurm step; within the task of a Slurm array where there is one. None where
-/// there is no launcher, or one process alone: that makes the whole table.
+/// The share of this process: the rank of an MPI launcher (Open MPI, MVAPICH, PALS, MPICH, Intel MPI), of jsrun, of
+/// Flux, or of a Slurm step; within its task of a Slurm array, if any. None without a launcher or for a single process,
+/// which makes the whole table.
 /// @param variable value of an environment variable, or null
-/// @throws Error that names the variable: a rank without a size, a value that is no number, a rank that is not below
-/// its size
+/// @throws Error that names the variable: a rank without a size, an invalid number, a rank not below its size
 std::optional<Launched> launched(const std::function<const char*(const char*)>& variable);
 
 }  // namespace medulla::tables

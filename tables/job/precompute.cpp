@@ -23,14 +23,15 @@ static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_alw
 
 constexpr unsigned seconds_of_grace = 5;
 
-/// What a signal handler may do: say it and end. Slices are on disk or not, so nothing is left half done.
+/// Ends the process from a signal handler, with a message. Slice files are complete or absent, so nothing is left half
+/// written.
 [[noreturn]] void give_up() {
-    constexpr char text[] = "medulla-precompute: interrupted: slices in work given up; go on with --resume\n";
+    constexpr char text[] = "medulla-precompute: interrupted: unfinished slices discarded; continue with --resume\n";
     message(STDERR_FILENO, text, sizeof text - 1);
     ::_exit(128 + caught);
 }
 
-/// Catches SIGINT and SIGTERM while it lives: the first gives the slices in work a few seconds to end, the second none.
+/// Catches SIGINT and SIGTERM in its lifetime. The first allows running slices a few seconds to end, the second none.
 class Interrupts {
   public:
     Interrupts() {
@@ -59,7 +60,7 @@ class Interrupts {
     struct sigaction old_[3];
 };
 
-/// Whether the output holds this job already. Throws Error where it is of another one.
+/// The output, if it is already that of this job. Throws Error if it is of another job.
 std::optional<Tables> finished(const Job& job, const Tables& plan) {
     if (!std::filesystem::exists(job.output)) return std::nullopt;
     Tables tables = read_tables(job.output);
@@ -71,7 +72,7 @@ std::optional<Tables> finished(const Job& job, const Tables& plan) {
     return tables;
 }
 
-/// A kept slice; what it took is not known, what it should have taken is.
+/// A stored slice, with its expected time, since the time it took is unknown.
 Refinable refinable(const Request& request, const SliceFolder& folder, const SliceId& id) {
     std::string why;
     const std::optional<Slice> slice = folder.read(id, why);
@@ -79,7 +80,7 @@ Refinable refinable(const Request& request, const SliceFolder& folder, const Sli
     return {id, slice->standard_error, static_cast<double>(expected_cost(request, id)) * 1e-6};
 }
 
-/// Solves what `slices` misses and keeps it; with a time budget coarsely first, then where error falls most.
+/// Solves and stores the missing ones of `slices`; with a time budget first coarsely, then where the error falls most.
 void solve(const Job& job, const SliceSolver& solver, const SliceFolder& folder, const std::vector<SliceId>& slices,
            const std::vector<bool>& kept) {
     const double start = omp_get_wtime(), budget = job.request.time_budget;
@@ -120,9 +121,9 @@ std::size_t count_kept(const SliceFolder& folder, const std::vector<SliceId>& sl
     return count;
 }
 
-void interrupted_if_asked(const SliceFolder& folder, const std::vector<SliceId>& slices) {
+void throw_if_interrupted(const SliceFolder& folder, const std::vector<SliceId>& slices) {
     if (stop)
-        throw Interrupted(caught, "interrupted: {} of {} slices kept in {}; go on with --resume",
+        throw Interrupted(caught, "interrupted: {} of {} slices kept in {}; continue with --resume",
                           count_kept(folder, slices), slices.size(), folder.path());
 }
 
@@ -166,22 +167,22 @@ JobReport run_job(const Job& job) {
             return report;
         }
     if (!job.resume && !job.share && !folder.files().empty())
-        throw Error("{}: holds slices of an earlier run; go on with --resume, or delete it", folder.path());
+        throw Error("{}: contains slices of an earlier run; continue with --resume, or delete it", folder.path());
     folder.open(!job.share);
     try {
         const std::vector<bool> kept = folder.kept(slices);
         report.kept = static_cast<std::size_t>(std::count(kept.begin(), kept.end(), true));
         if (job.share && !job.resume && report.kept > 0)
-            throw Error("{}: holds {} of this worker's {} slices already; go on with --resume, or delete it",
+            throw Error("{}: already contains {} of this worker's {} slices; continue with --resume, or delete it",
                         folder.path(), report.kept, slices.size());
         solve(job, solver, folder, slices, kept);
-        interrupted_if_asked(folder, slices);
+        throw_if_interrupted(folder, slices);
         if (job.share) {
             report.tables = plan;
             return report;
         }
         report.tables = assemble(folder, plan);
-        interrupted_if_asked(folder, slices);
+        throw_if_interrupted(folder, slices);
         write_tables(output, report.tables, job.compression, folder.scratch());
     } catch (const Interrupted&) {
         throw;
@@ -189,7 +190,7 @@ JobReport run_job(const Job& job) {
         const std::size_t count = count_kept(folder, slices);
         folder.remove_if_empty();
         if (count == 0 || job.share) throw;
-        throw Error("{}; {} of {} slices kept in {}, go on with --resume", error.what(), count, slices.size(),
+        throw Error("{}; {} of {} slices kept in {}, continue with --resume", error.what(), count, slices.size(),
                     folder.path());
     }
     folder.remove();

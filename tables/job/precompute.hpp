@@ -1,5 +1,5 @@
-// A job from request to tables file: slices are kept in `<output>.shards/` as they are solved, so that a kill, a full
-// disk or a crash at any moment loses at most the slices in work. docs/formats.md, docs/cluster.md.
+// A job from request to tables file. Solved slices are stored in `<output>.shards/`, so that a kill, a full disk or a
+// crash at any moment loses at most the slices being solved. docs/formats.md, docs/cluster.md.
 #pragma once
 
 #include <optional>
@@ -23,17 +23,17 @@ struct Job {
 };
 
 struct JobReport {
-    Tables tables;              ///< of the whole job; of a worker its axes only
-    bool was_complete = false;  ///< the output was there already, of the same configuration
+    Tables tables;              ///< of the whole job; for a worker only its axes
+    bool was_complete = false;  ///< the output of the same configuration already existed
     std::string folder;         ///< of the slice files
     std::size_t slices = 0;     ///< of the job, or of the worker's share
-    std::size_t kept = 0;       ///< of these, found kept
+    std::size_t kept = 0;       ///< of these, already stored
 };
 
-/// Runs a job. Throws Interrupted on SIGINT or SIGTERM, Error where it could not be done; both say what is kept.
+/// Runs a job. Throws Interrupted on SIGINT or SIGTERM, Error where it could not be done; both name the stored slices.
 JobReport run_job(const Job& job);
 
-/// Tables from the slices kept in a folder; throws Error if one is missing or damaged.
+/// Tables from the slice files of a folder; throws Error if one is missing or damaged.
 Tables assemble(const SliceFolder& folder, const Tables& plan);
 
 }  // namespace medulla::tables

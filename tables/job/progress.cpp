@@ -57,6 +57,7 @@ void Progress::print(bool last) {
 
 std::string duration_text(double seconds) {
     if (seconds < 100) return fmt::format("{:.1f} s", seconds);
+    if (!(seconds < 3.6e9)) return fmt::format("{:.2g} h", seconds / 3600);
     const auto whole = static_cast<long>(std::lround(seconds));
     if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
     return fmt::format("{} h {:02} min", whole / 3600, whole % 3600 / 60);

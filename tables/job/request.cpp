@@ -44,7 +44,8 @@ void check_request(const Request& request) {
         throw Error("--sigma-range: expected at most {:g}, found {:g}", greatest_radius, request.sigma.values.back());
     if (request.bins < 8 || request.bins > 4096 || request.bins % 2 != 0)
         throw Error("--bins: expected an even number from 8 to 4096, found {}", request.bins);
-    const int fewer_bits = request.method == Method::analog ? 0 : 5;  // of random numbers than the analog tracer has
+    const int fewer_bits =
+        request.method == Method::analog ? 0 : 5;  // than the analog tracer in the counter of random numbers
     if (request.paths < 1 || request.paths > most_paths >> fewer_bits)
         throw Error("--paths: expected 1 to {}, found {}", most_paths >> fewer_bits, request.paths);
     const std::size_t most =

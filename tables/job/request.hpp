@@ -33,10 +33,10 @@ Request default_request();
 /// Largest optical radius, of scattering and of absorption.
 inline constexpr double greatest_radius = 1000;
 
-/// Most paths of any method: what the tracers have random numbers for.
+/// Largest number of paths of any method; the tracers' random numbers allow no more.
 inline constexpr std::uint64_t most_paths = std::uint64_t{1} << 40;
 
-/// Least and greatest target_error.
+/// Range of target_error.
 inline constexpr double least_target = 1e-5, greatest_target = 0.1;
 
 /// Throws Error unless every cell is within the range of its solver.

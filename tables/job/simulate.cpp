@@ -26,8 +26,9 @@ std::uint64_t cell_key(std::uint64_t kind, std::initializer_list<double> paramet
     };
     std::uint64_t key = mix(kind + 0x9e3779b97f4a7c15u);
     for (const double x : parameters) {
+        const double same = x + 0.0;  // -0 becomes 0
         std::uint64_t bits;
-        std::memcpy(&bits, &x, sizeof bits);
+        std::memcpy(&bits, &same, sizeof bits);
         key = mix(key ^ bits) + 0x9e3779b97f4a7c15u;
     }
     return key;
@@ -36,7 +37,7 @@ std::uint64_t cell_key(std::uint64_t kind, std::initializer_list<double> paramet
 /// Stores a solved cell, its lobe as floats.
 void store(Slice& slice, std::size_t cell, const sim2d::Profile& profile) {
     if (profile.lobe.size() != slice.bins) throw Error("cell {}: the solver returned no lobe", cell);
-    if (!(profile.standard_error >= 0)) throw Error("cell {}: the solver knows no error", cell);
+    if (!(profile.standard_error >= 0)) throw Error("cell {}: the solver gave no error", cell);
     for (std::size_t b = 0; b < slice.bins; ++b)
         slice.lobe[cell * slice.bins + b] = static_cast<float>(profile.lobe[b]);
     slice.energy[cell] = profile.energy;
@@ -70,11 +71,13 @@ template <class Trace>
 auto count_until(const Goal& goal, Trace&& trace) {
     for (std::uint64_t paths = goal.target_error > 0 ? 4096 : goal.paths;;) {
         auto counted = trace(paths);
+        if (goal.target_error == 0 || paths >= goal.paths) return counted;
         const double ratio = worst_error(counted) / goal.target_error;
-        if (goal.target_error == 0 || ratio <= 1 || paths >= goal.paths) return counted;
+        if (ratio <= 1) return counted;
         // An error estimate from few counts is rough: at most 64 times as many at once.
         const double wanted = std::clamp(1.05 * ratio * ratio, 2.0, 64.0) * static_cast<double>(paths);
-        paths = static_cast<std::uint64_t>(std::min(wanted, static_cast<double>(goal.paths)));
+        paths = static_cast<std::uint64_t>(
+            std::min(static_cast<double>(goal.paths), wanted));  // if wanted is NaN, goal.paths
     }
 }
 

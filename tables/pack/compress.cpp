@@ -22,13 +22,14 @@ constexpr double usual_bits = 9, ample_bits = 12.5;
 /// Rank of the energies: at more, only rounding is left. The slab's have three short axes, the disc's with absorption
 /// four. A small pack spends at most a 17th of its bytes on them.
 int energy_rank(const Part& part, const CompressOptions& options) {
-    const int most = part.kind == TableKind::survival ? 48 : 32;
+    const int most = std::min(part.kind == TableKind::survival ? 48 : 32, part.most_rank());
     if (!options.max_bytes) return most;
     const double room = static_cast<double>(*options.max_bytes) / 17 / part.component_bytes(usual_bits);
-    return std::clamp(static_cast<int>(room / rank_step) * rank_step, rank_step, most);
+    return std::min(std::max(static_cast<int>(std::min<double>(room, most) / rank_step) * rank_step, rank_step), most);
 }
-/// Rank of the pilot solves, which measure how hard each part is.
-constexpr int pilot_rank = 32;
+/// Rank of the pilot solves, which measure how hard each part is: below the most that a part can have, where no error
+/// is left to measure.
+int pilot_rank(const Part& part) { return std::clamp(part.most_rank() / 2, 1, 32); }
 /// Bytes reserved for the provenance text while components are distributed; bits get what it does not use.
 constexpr std::size_t text_room = 800;
 /// Errors fall about as rank^-2 in bench/bench_compress (docs/accuracy.md); only the distribution of components uses
@@ -57,7 +58,9 @@ struct Solve {
     double error = 0;  ///< relative L2 of the kind, without the exit spline's part
 
     /// Error expected at another rank.
-    double expected(double other) const { return error * std::pow(other / rank, -decay); }
+    double expected(double other) const {
+        return other >= part->most_rank() ? 0 : error * std::pow(other / rank, -decay);
+    }
 };
 using Solves = std::vector<Solve>;
 
@@ -91,6 +94,7 @@ void run(Solves& solves, const CompressOptions& options, bool pilot, const Sourc
         // Energies are no densities: their factors need not be non-negative.
         const bool signed_factors = !solve.part->lobes() && options.solver == tensor::Solver::nonnegative;
         solve.result = tensor::cp(solve.part->values, signed_factors ? tensor::Solver::lm : options.solver, settings);
+        solve.rank = solve.result.model.rank();  // at most most_rank
         solve.error = solve.part->share * solve.result.report.relative_error;
         renewed[i - 1] = solve.part->lobes();
     }
@@ -161,16 +165,32 @@ std::size_t pack_bytes(const Solves& solves, double bits) {
         more += (bits / 8 - 1) * static_cast<double>(table.rows() * table.stride());
         tables.push_back(std::move(table));
     }
-    return write_pack(tables, std::string(text_room, ' ')).size() + static_cast<std::size_t>(more);
+    const std::size_t at_8_bits = write_pack(tables, std::string(text_room, ' ')).size();
+    return at_8_bits + static_cast<std::size_t>(static_cast<std::ptrdiff_t>(more));  // more than -at_8_bits / 2
+}
+
+/// Rank beyond which a solve no longer reduces the error of its kind: there its error is a quarter of that of the exit
+/// splines, which raises the root of the sum of their squares by 3 %. A multiple of 8, or the most that the part can
+/// have.
+int most_useful(const Solves& solves, const Solve& solve) {
+    double exit = 0, parts = 0;
+    for (const Solve& other : solves)
+        if (other.part->kind == solve.part->kind) exit += std::pow(other.part->exit_error, 2), ++parts;
+    const double hidden = std::sqrt(exit / parts) / 4, most = std::min(greatest_rank / 2, solve.part->most_rank());
+    if (solve.rank >= solve.part->most_rank()) return solve.rank;  // exact already
+    const double rank = hidden > 0 ? solve.rank * std::pow(solve.error / hidden, 1 / decay) : most;
+    return static_cast<int>(std::min(std::ceil(std::min(rank, most) / rank_step) * rank_step, most));
 }
 
 void share_bytes(Solves& solves, std::size_t bytes, double bits) {
     const Solves pilot = solves;
+    std::vector<int> most;
+    for (const Solve& solve : pilot) most.push_back(most_useful(pilot, solve));
     const auto set = [&](double lambda) {
         for (std::size_t i = 0; i < solves.size(); ++i) {
-            if (!solves[i].part->lobes()) continue;
-            const double share = share_of(pilot[i], lambda) / rank_step;
-            solves[i].rank = rank_step * std::clamp(static_cast<int>(share), 1, greatest_rank / 2 / rank_step);
+            if (!solves[i].part->lobes() || pilot[i].rank >= pilot[i].part->most_rank()) continue;
+            const double steps = std::min<double>(share_of(pilot[i], lambda) / rank_step, greatest_rank);
+            solves[i].rank = std::min(rank_step * std::max(static_cast<int>(steps), 1), most[i]);
         }
     };
     const auto fits = [&](double lambda) {
@@ -182,19 +202,21 @@ void share_bytes(Solves& solves, std::size_t bytes, double bits) {
     // Bytes left over by rounding down go where they help most.
     for (;;) {
         std::size_t best = solves.size();
-        double most = 0;
+        double greatest_gain = 0;
         for (std::size_t i = 0; i < solves.size(); ++i) {
             const int step = rank_step * solves[i].part->copies();
             if (!solves[i].part->lobes() || stored_rank(solves, solves[i].part->kind) + step > greatest_rank) continue;
-            const double now = pilot[i].expected(solves[i].rank), then = pilot[i].expected(solves[i].rank + rank_step);
+            const int before = solves[i].rank, after = std::min(before + rank_step, most[i]);
+            if (after <= before) continue;
+            const double now = pilot[i].expected(before), then = pilot[i].expected(after);
             const double gain = (now * now - then * then) / solves[i].part->component_bytes(usual_bits);
-            if (gain <= most) continue;
-            solves[i].rank += rank_step;
-            if (pack_bytes(solves, bits) <= bytes) best = i, most = gain;
-            solves[i].rank -= rank_step;
+            if (gain <= greatest_gain) continue;
+            solves[i].rank = after;
+            if (pack_bytes(solves, bits) <= bytes) best = i, greatest_gain = gain;
+            solves[i].rank = before;
         }
         if (best == solves.size()) return;
-        solves[best].rank += rank_step;
+        solves[best].rank = std::min(solves[best].rank + rank_step, most[best]);
     }
 }
 
@@ -272,6 +294,14 @@ std::vector<PackedTable> pack_tables(const Solves& solves, const CompressOptions
 struct Balance {
     double components = 0, rounding = 0;  ///< from truncated components and from rounding
     double bits = 0;                      ///< per number on average
+
+    /// Bits at which rounding has its share of the squared error: half a bit less doubles its square. Without an error
+    /// of truncation that is the most bits, without one of rounding the fewest.
+    double bits_in_balance() const {
+        if (!(components > 0)) return 16;
+        if (!(rounding > 0)) return 4;
+        return std::clamp(bits + 0.5 * std::log2(rounding / (balanced_rounding * components)), 4.0, 16.0);
+    }
 };
 Balance balance_of(const Solves& solves, const CompressOptions& options) {
     const std::vector<PackedTable> tables = pack_tables(solves, options, text_room);
@@ -293,8 +323,7 @@ void share_again(Solves& solves, const CompressOptions& options, const Source* t
     Balance now = balance_of(solves, options);
     for (int tries = 0; tries < 4 && !too_large(solves, options); ++tries) {
         Solves next = solves;
-        const double excess = now.rounding / (balanced_rounding * now.components);
-        share_bytes(next, *options.max_bytes, now.bits + 0.5 * std::log2(excess));
+        share_bytes(next, *options.max_bytes, now.bits_in_balance());
         run(next, options, false, tables);
         const Balance then = balance_of(next, options);
         if (!(then.components + then.rounding < now.components + now.rounding)) return;
@@ -334,19 +363,22 @@ void solve_to(Solves& solves, double error, const CompressOptions& options, cons
             const double lambda = greatest(too_coarse);
             int total = 0;
             for (Solve& solve : next) {
-                solve.rank = rank_step * static_cast<int>(std::ceil(share_of(solve, lambda) / rank_step));
+                const double steps = std::min<double>(std::ceil(share_of(solve, lambda) / rank_step), greatest_rank);
                 const int others = rank_step * static_cast<int>(next.size() - 1);
-                solve.rank = std::clamp(solve.rank, rank_step, greatest_rank / copies - others);
-                total += solve.rank * copies;
+                solve.rank =
+                    std::clamp(rank_step * static_cast<int>(steps), rank_step, greatest_rank / copies - others);
+                solve.rank = std::min(solve.rank, solve.part->most_rank());
+                total += padded(solve.rank) * copies;
             }
             // Between a total that was too small and one that sufficed nothing is left to try.
             if (total >= least || total > greatest_rank) total = std::min(least - step, greatest_rank);
             // Every part needs at least one block of components.
             if (total <= floor || total < step * static_cast<int>(next.size())) break;
-            while (stored_rank(next, next[0].part->kind) > total)
-                std::max_element(next.begin(), next.end(), [](const Solve& a, const Solve& b) {
-                    return a.rank < b.rank;
-                })->rank -= rank_step;
+            while (stored_rank(next, next[0].part->kind) > total) {
+                Solve& largest = *std::max_element(next.begin(), next.end(),
+                                                   [](const Solve& a, const Solve& b) { return a.rank < b.rank; });
+                largest.rank = padded(largest.rank) - rank_step;
+            }
             run(next, options, false, tables);
             std::copy(next.begin(), next.end(), solves.begin() + static_cast<std::ptrdiff_t>(first));
             if (kind_error(solves, first, last) <= error) {
@@ -421,8 +453,10 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
         (options.solver == tensor::Solver::nonnegative ? whole_lobes_of : parts_of)(tables, options.spans);
     Solves solves;
     const bool searched = options.max_error || options.max_bytes;
-    const int rank = searched ? pilot_rank : options.rank;
-    for (const Part& part : parts) solves.push_back({&part, part.lobes() ? rank : energy_rank(part, options)});
+    for (const Part& part : parts) {
+        const int rank = !part.lobes() ? energy_rank(part, options) : searched ? pilot_rank(part) : options.rank;
+        solves.push_back({&part, std::min(rank, part.most_rank())});
+    }
     std::unique_ptr<Source> source;
     if (options.solver == tensor::Solver::nonnegative) source = table_source(tables);
     if (searched) run(solves, options, true, source.get());

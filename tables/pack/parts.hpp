@@ -31,6 +31,8 @@ struct Part {
     bool lobes() const { return is_lobe(kind); }
     /// Components of the pack per component of the model.
     int copies() const { return static_cast<int>(std::max<std::size_t>(1, exit_maps.size())); }
+    /// Number of components that represents any values exactly.
+    int most_rank() const { return tensor::most_components(values.shape); }
     /// Bytes of one component of the model in a pack at `bits` per number: its rows, a scale, an integral.
     double component_bytes(double bits) const;
 };

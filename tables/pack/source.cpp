@@ -13,8 +13,6 @@
 
 #include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
-#include "sim2d/disc/single.hpp"
-#include "sim2d/slab/single.hpp"
 #include "tables/error.hpp"
 #include "tables/pack/spline.hpp"
 #include "tables/parallel.hpp"
@@ -67,7 +65,7 @@ class TableSource : public Source {
         return std::abs(noise);
     }
 
-    double back_fraction(const Parameters& at) const override {
+    double signed_back_fraction(const Parameters& at) const override {
         const Table& table = *tables_.longitudinal;
         double back = 0, total = 0;
         for_nodes(table, at, [&](std::size_t cell, double weight) {
@@ -77,11 +75,11 @@ class TableSource : public Source {
         return total > 0 ? back / total : 0.5;  // no scattered energy: any share
     }
 
-    double survival(const Parameters& at) const override {
-        if (lengths_.empty()) return 1;
+    double signed_survival_length(const Parameters& at) const override {
+        if (lengths_.empty()) return 0;
         double length = 0;
         for_nodes(*tables_.azimuthal, at, [&](std::size_t cell, double weight) { length += weight * lengths_[cell]; });
-        return std::exp(-at.absorption * length);
+        return length;
     }
 
   private:
@@ -136,13 +134,8 @@ class PackSource : public Source {
         pack_ = opened.pack;
         for (const TableView& table : pack_.tables)
             if (table) check_nodes(table, path);
-        const auto text = nlohmann::json::parse(pack_.text, pack_.text + pack_.text_bytes, nullptr, false);
-        for (const TableKind kind : lobe_kinds) {
-            const auto noise =
-                nlohmann::json::json_pointer(fmt::format("/fit/{}/input_noise", medulla::tables::name_of(kind)));
-            const bool known = text.is_object() && text.contains(noise) && text[noise].is_number();
-            noise_[static_cast<std::size_t>(kind)] = known ? text[noise].get<double>() : 0.0;
-        }
+        for (const TableKind kind : lobe_kinds)
+            noise_[static_cast<std::size_t>(kind)] = stated(pack_, kind, "input_noise", 0.0);
     }
 
     bool has(TableKind kind) const override { return static_cast<bool>(pack_[kind]); }
@@ -211,17 +204,17 @@ class PackSource : public Source {
 
     double noise(TableKind kind, const Parameters&) const override { return noise_[static_cast<std::size_t>(kind)]; }
 
-    double back_fraction(const Parameters& at) const override {
+    double signed_back_fraction(const Parameters& at) const override {
         const TableView& table = pack_[TableKind::back_fraction];
         if (!table) throw Error("the pack has no table of the slab's energies");
         return static_cast<double>(scalar(table, contract(table, query(at))));
     }
 
-    double survival(const Parameters& at) const override {
-        if (!absorbs()) return 1;
+    double signed_survival_length(const Parameters& at) const override {
+        if (!absorbs()) return 0;
         const TableView& table = pack_[TableKind::survival];
         if (!table) throw Error("the pack has no table of what absorption leaves");
-        return survival_of(at.absorption, static_cast<double>(scalar(table, contract(table, query(at)))));
+        return static_cast<double>(scalar(table, contract(table, query(at))));
     }
 
   private:
@@ -340,6 +333,18 @@ std::string Source::beyond(TableKind kind, const Parameters& at) const {
     return "";
 }
 
+double stated(const PackView& pack, TableKind kind, const char* what, double otherwise) {
+    const auto text = nlohmann::json::parse(pack.text, pack.text + pack.text_bytes, nullptr, false);
+    const auto place = nlohmann::json::json_pointer(fmt::format("/fit/{}/{}", name_of(kind), what));
+    if (!text.is_object() || !text.contains(place) || !text[place].is_number()) return otherwise;
+    const double value = text[place].get<double>();
+    return value >= 0 ? value : otherwise;
+}
+
+double Source::back_fraction(const Parameters& at) const { return std::clamp(signed_back_fraction(at), 0.0, 1.0); }
+
+double Source::survival(const Parameters& at) const { return survival_of(at.absorption, signed_survival_length(at)); }
+
 bool Source::absorbs() const {
     if (!has(TableKind::azimuthal)) return false;
     const std::vector<Axis> axes = parameter_axes(TableKind::azimuthal);
@@ -347,8 +352,8 @@ bool Source::absorbs() const {
 }
 
 double energy_of(const Source& source, TableKind kind, const Parameters& at) {
-    if (kind == TableKind::azimuthal) return sim2d::disc_energy(at.sigma, at.h) * source.survival(at);
-    const double back = source.back_fraction(at), total = sim2d::slab_energy(at.sigma, at.theta_i);
+    if (kind == TableKind::azimuthal) return azimuthal_energy(at.sigma, at.h) * source.survival(at);
+    const double back = source.back_fraction(at), total = longitudinal_energy(at.sigma, at.theta_i);
     return total * (kind == TableKind::longitudinal_back ? back : 1 - back);
 }
 

@@ -46,10 +46,16 @@ class Source {
     /// Relative L2 standard error of a lobe, interpolated between nodes. For a pack: of all lobes of its table, from
     /// its provenance. 0 if unknown.
     virtual double noise(TableKind kind, const Parameters& at) const = 0;
-    /// Share of the slab's scattered energy that leaves backward.
-    virtual double back_fraction(const Parameters& at) const = 0;
-    /// Share of the disc's scattered energy that is not absorbed; 1 without an axis of absorption.
-    virtual double survival(const Parameters& at) const = 0;
+    /// Share of the slab's scattered energy that leaves backward, before clamping: interpolation and truncated
+    /// components can take it outside [0, 1].
+    virtual double signed_back_fraction(const Parameters& at) const = 0;
+    /// Length l such that exp(-absorption l) of the disc's scattered energy is not absorbed, before clamping: it can be
+    /// negative. 0 without an axis of absorption.
+    virtual double signed_survival_length(const Parameters& at) const = 0;
+    /// The share that leaves backward, clamped to [0, 1].
+    double back_fraction(const Parameters& at) const;
+    /// Share of the disc's scattered energy that is not absorbed, in [0, 1]; 1 without an axis of absorption.
+    double survival(const Parameters& at) const;
     bool absorbs() const;  ///< azimuthal lobes have an axis of absorption
 
     /// Text with the first axis whose range does not contain `at`, the range and the value. Empty if there is none, or
@@ -70,6 +76,9 @@ std::unique_ptr<Source> pack_source(std::vector<unsigned char> bytes, const std:
 /// Reads and validates a pack's bytes (`default`: the one built in). Throws Error that names the path and, with
 /// `or_tables`, says that a tables file is accepted as well.
 std::vector<unsigned char> read_pack(const std::string& path, bool or_tables = false);
+
+/// A number >= 0 that a pack's provenance states of the fit of a kind, or `otherwise`.
+double stated(const PackView& pack, TableKind kind, const char* what, double otherwise);
 
 /// Error of one source against another, over every node of the reference.
 struct LobeError {

@@ -1,5 +1,7 @@
-// furtable compress and furtable diff: make a pack, and say how far one file is from another.
+// furtable compress and furtable diff: make a pack, and the error of one file against another.
 #include <fmt/core.h>
+
+#include <algorithm>
 
 #include "tables/pack/compress.hpp"
 #include "tables/programs/commands.hpp"
@@ -14,7 +16,7 @@ namespace {
 /// Of the pack that ships with the runtime.
 constexpr std::size_t default_bytes = 153600;
 
-struct CompressWords {
+struct CompressArguments {
     std::vector<std::string> files;
     std::string output, solver = "lm";
     std::optional<int> rank;
@@ -29,8 +31,26 @@ const char* mirror_name(Mirror mirror) {
     return mirror == Mirror::none ? "whole" : (mirror == Mirror::even ? "even" : "odd");
 }
 
-/// Whether fit_error is of normalised lobes.
+/// Whether fit_error refers to normalised lobes.
 bool is_nonnegative(const TableReport& report) { return report.parts[0].solve.solver == std::string("nonnegative"); }
+
+/// Text for a pack without a size option: the error of its worst kind, and whether more components reduce it. They do
+/// not if the squared error of the exit splines is more than 16 times that of the components, for every kind.
+std::string distance_of(const CompressResult& result, int rank) {
+    const LobeError& worst =
+        *std::max_element(result.errors.begin(), result.errors.end(),
+                          [](const LobeError& a, const LobeError& b) { return a.relative < b.relative; });
+    const bool nearer = std::any_of(result.tables.begin(), result.tables.end(), [](const TableReport& report) {
+        const double exit = report.exit_error * report.exit_error;
+        return is_lobe(report.kind) && report.fit_error * report.fit_error - exit > exit / 16;
+    });
+    return fmt::format("rank {} is {:.1e} (relative L2) from the table, in its {} lobes; ", rank, worst.relative,
+                       name_of(worst.kind)) +
+           (nearer ? fmt::format(
+                         "--max-bytes {}, the size of the built-in pack, takes more components and is more accurate",
+                         default_bytes)
+                   : "more components do not help: the error left is that of the exit splines");
+}
 
 nlohmann::ordered_json report_json(const TableReport& report) {
     nlohmann::ordered_json json = {
@@ -49,7 +69,7 @@ nlohmann::ordered_json report_json(const TableReport& report) {
     return json;
 }
 
-/// The tables of one file, or of two that hold one kind each (on axes of their own).
+/// The tables of one file, or of two with one table each (on different axes).
 Tables read_all(const std::vector<std::string>& files) {
     Tables all = read_tables(files[0]);
     for (std::size_t i = 1; i < files.size(); ++i) {
@@ -66,32 +86,27 @@ Tables read_all(const std::vector<std::string>& files) {
 
 std::string file_name(const std::string& path) { return path.substr(path.rfind('/') + 1); }
 
-void run_compress(const CompressWords& words) {
-    const std::string& first = words.files[0];
+void run_compress(const CompressArguments& args) {
+    const std::string& first = args.files[0];
     const bool named = first.size() > 3 && first.compare(first.size() - 3, 3, ".h5") == 0;
     const std::string stem = named ? first.substr(0, first.size() - 3) : first;
-    const Output output(words.output.empty() ? stem + ".furpack" : words.output, words.files);
-    if (!words.json) print_messages();
+    const Output output(args.output.empty() ? stem + ".furpack" : args.output, args.files);
+    if (!args.json) print_messages();
     CompressOptions options;
-    if (words.rank) options.rank = *words.rank;
-    options.seed = words.seed;
-    options.max_sweeps = words.sweeps;
-    options.solver = words.solver == "als" ? tensor::Solver::als : tensor::Solver::lm;
-    if (words.nonnegative) options.solver = tensor::Solver::nonnegative;
-    options.max_error = words.max_error;
-    options.max_bytes = words.max_bytes;
+    if (args.rank) options.rank = *args.rank;
+    options.seed = args.seed;
+    options.max_sweeps = args.sweeps;
+    options.solver = args.solver == "als" ? tensor::Solver::als : tensor::Solver::lm;
+    if (args.nonnegative) options.solver = tensor::Solver::nonnegative;
+    options.max_error = args.max_error;
+    options.max_bytes = args.max_bytes;
+    const bool sized = options.max_error || options.max_bytes;
     std::string input;
-    for (const std::string& file : words.files) input += (input.empty() ? "" : ", ") + json_name(file_name(file));
-    const Tables tables = read_all(words.files);
+    for (const std::string& file : args.files) input += (input.empty() ? "" : ", ") + json_name(file_name(file));
+    const Tables tables = read_all(args.files);
     const CompressResult result = compress(tables, options, input);
     output.write(result.pack.data(), result.pack.size());
-    // Who asked for no size is told what the default pack's would give.
-    const bool unsized = !words.rank && !options.max_error && !options.max_bytes;
-    const auto larger = [&] {
-        options.max_bytes = default_bytes;
-        return compress(tables, options, input);
-    };
-    if (words.json) {
+    if (args.json) {
         nlohmann::ordered_json json = {{"output", json_name(output.path())},
                                        {"bytes", result.pack.size()},
                                        {"seconds", result.solve_seconds},
@@ -100,10 +115,6 @@ void run_compress(const CompressWords& words) {
             json["factors"][medulla::tables::name_of(report.kind)] = report_json(report);
         json["errors"] = to_json(result.errors);
         json["degeneracy"] = to_json(result.degeneracy);
-        if (unsized) {
-            const CompressResult more = larger();
-            json["max_bytes_153600"] = {{"bytes", more.pack.size()}, {"errors", to_json(more.errors)}};
-        }
         print("{}\n", json_line(json));
         return;
     }
@@ -112,56 +123,50 @@ void run_compress(const CompressWords& words) {
               medulla::tables::name_of(report.kind), is_nonnegative(report) ? "in the pack" : "factors",
               report.fit_error, report.exit_error, report.rounding, report.noise);
         for (const PartReport& part : report.parts)
-            print("  {:<8} rank {:>3}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
-                  mirror_name(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
-                  tensor::to_string(part.solve.stop), part.solve.seconds, part.solve.degeneracy.least_cosine,
-                  part.solve.degeneracy.norm_ratio);
+            print("  {:<8} rank {:>3}{}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
+                  mirror_name(part.mirror), part.rank,
+                  is_lobe(report.kind) && !sized && part.rank < options.rank ? " (all that this table can have)" : "",
+                  part.solve.solver, part.solve.iterations, tensor::to_string(part.solve.stop), part.solve.seconds,
+                  part.solve.degeneracy.least_cosine, part.solve.degeneracy.norm_ratio);
     }
     print(result.errors);
     print(result.degeneracy);
     print("{}: {} bytes in {:.2f} s ({:.2f} s of processor time)\n", output.path(), result.pack.size(),
           result.solve_seconds, result.cpu_seconds);
-    if (!unsized) return;
-    print("for comparison, solving for --max-bytes {} (give a size, --rank 16 say, to leave it out) ..\n",
-          default_bytes);
-    flush_output();
-    std::string errors;
-    for (const LobeError& error : larger().errors)
-        errors += fmt::format("{}{} {:.1e}", errors.empty() ? "" : ", ", name_of(error.kind), error.relative);
-    print("with --max-bytes {}: {}\n", default_bytes, errors);
+    if (!args.rank && !sized) print("{}\n", distance_of(result, options.rank));
 }
 
-struct DiffWords {
+struct DiffArguments {
     std::string a, b;
     bool json = false;
 };
 
-void run_diff(const DiffWords& words) {
-    const auto reference = open_source(words.a), candidate = open_source(words.b);
+void run_diff(const DiffArguments& args) {
+    const auto reference = open_source(args.a), candidate = open_source(args.b);
     for (const TableKind kind : lobe_kinds) {
         if (!reference->has(kind) || !candidate->has(kind)) continue;
-        // The candidate must cover the reference's nodes; it is asked at each of them.
+        // The candidate is evaluated at all nodes of the reference and must cover them.
         Parameters low, high;
         for (const Axis& axis : reference->parameter_axes(kind)) {
             low.set(axis.name, axis.values.front());
             high.set(axis.name, axis.values.back());
         }
-        candidate->check(kind, low, words.b);
-        candidate->check(kind, high, words.b);
+        candidate->check(kind, low, args.b);
+        candidate->check(kind, high, args.b);
     }
     std::vector<LobeError> errors;
     try {
         errors = compare(*reference, *candidate);
     } catch (const Error& error) {
-        throw Error("{} and {}: {}", words.a, words.b, error.what());
+        throw Error("{} and {}: {}", args.a, args.b, error.what());
     }
-    if (errors.empty()) throw Error("{} and {}: expected a table that both have, found none", words.a, words.b);
+    if (errors.empty()) throw Error("{} and {}: expected a table that both have, found none", args.a, args.b);
     PackDegeneracy degeneracy;
-    if (words.b == "default" || !is_hdf5(words.b)) {
-        const std::vector<unsigned char> bytes = read_pack(words.b);
+    if (args.b == "default" || !is_hdf5(args.b)) {
+        const std::vector<unsigned char> bytes = read_pack(args.b);
         degeneracy = degeneracy_of(open_pack(bytes.data(), bytes.size()).pack);
     }
-    if (words.json) {
+    if (args.json) {
         nlohmann::ordered_json json = {{"errors", to_json(errors)}};
         if (!degeneracy.empty()) json["degeneracy"] = to_json(degeneracy);
         print("{}\n", json_line(json));
@@ -210,7 +215,7 @@ void print(const std::vector<LobeError>& errors) {
                   error.relative < error.noise ? ": no error below the noise is known" : "");
     for (const LobeError& error : errors)
         if (error.kind == TableKind::longitudinal_back)
-            print("share of energy that leaves backward: off by at most {:.1e}\n", error.back_share);
+            print("share of energy that leaves backward: largest error {:.1e}\n", error.back_share);
 }
 
 void print(const PackDegeneracy& degeneracy) {
@@ -220,45 +225,45 @@ void print(const PackDegeneracy& degeneracy) {
 }
 
 void add_compress(CLI::App& app, Action& action) {
-    add_command<CompressWords>(
+    add_command<CompressArguments>(
         app, action, "compress", "tables.h5 -> low-rank pack",
-        [](CLI::App& command, CompressWords& words) {
-            command.add_option("FILE", words.files, "tables file, or two with one table each")
+        [](CLI::App& command, CompressArguments& args) {
+            command.add_option("FILE", args.files, "tables file, or two with one table each")
                 ->required()
                 ->expected(1, 2);
-            command.add_option("-o,--output", words.output, "pack to write (default: FILE with .furpack)");
+            command.add_option("-o,--output", args.output, "pack to write (default: FILE with .furpack)");
             auto* size = command.add_option_group("size")->require_option(0, 1);
-            add_number(*size, "--rank", words.rank,
+            add_number(*size, "--rank", args.rank,
                        "components of each part: lobes have a mirror-even and an odd one (default 16). A pack "
                        "stores them padded with zeros to a multiple of 8, so that 4 take the bytes of 8",
                        {1, static_cast<int>(max_rank / 2)});
-            add_number(*size, "--max-error", words.max_error,
+            add_number(*size, "--max-error", args.max_error,
                        "smallest pack that keeps this relative L2, rounding included", above_zero);
-            add_number(*size, "--max-bytes", words.max_bytes, "least error within this many bytes",
+            add_number(*size, "--max-bytes", args.max_bytes, "least error within this many bytes",
                        {1, std::numeric_limits<std::size_t>::max()});
-            command.add_option("--solver", words.solver, "alternating least squares or Levenberg-Marquardt")
+            command.add_option("--solver", args.solver, "alternating least squares or Levenberg-Marquardt")
                 ->check(CLI::IsMember({"als", "lm"}))
                 ->capture_default_str();
             command
-                .add_flag("--nonnegative", words.nonnegative,
+                .add_flag("--nonnegative", args.nonnegative,
                           "factors >= 0: each component is a density; by coordinate descent")
                 ->excludes("--solver");
-            add_number(command, "--seed", words.seed, "of the solver's start")->capture_default_str();
-            add_number(command, "--sweeps", words.sweeps,
+            add_number(command, "--seed", args.seed, "of the solver's start")->capture_default_str();
+            add_number(command, "--sweeps", args.sweeps,
                        "most steps of a solve (default: of lm 100, of als 500); more leave a little less error",
                        {1, 100000});
-            command.add_flag("--json", words.json, "print one JSON object");
+            command.add_flag("--json", args.json, "print one JSON object");
         },
         run_compress);
 }
 
 void add_diff(CLI::App& app, Action& action) {
-    add_command<DiffWords>(
+    add_command<DiffArguments>(
         app, action, "diff", "error of B against A",
-        [](CLI::App& command, DiffWords& words) {
-            command.add_option("A", words.a, "reference: tables file or pack")->required();
-            command.add_option("B", words.b, "tables file or pack")->required();
-            command.add_flag("--json", words.json, "print one JSON object");
+        [](CLI::App& command, DiffArguments& args) {
+            command.add_option("A", args.a, "reference: tables file or pack")->required();
+            command.add_option("B", args.b, "tables file or pack")->required();
+            command.add_flag("--json", args.json, "print one JSON object");
         },
         run_diff);
 }

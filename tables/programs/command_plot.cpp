@@ -1,8 +1,8 @@
-// furtable plot and furtable export: pictures of lobes, and packs and tables in other programs' forms.
+// furtable plot and furtable export: figures of lobes; packs and tables in the formats of other programs.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <optional>
 
@@ -10,51 +10,48 @@
 #include "tables/pack/glsl.hpp"
 #include "tables/programs/commands.hpp"
 #include "tables/programs/lobe_figure.hpp"
-#include "tables/store/file.hpp"
-#include "tables/store/json_text.hpp"
+#include "tables/programs/number.hpp"
 #include "tables/store/output.hpp"
 
 namespace medulla::tables {
 namespace {
 
-struct PlotWords {
+struct PlotArguments {
     std::vector<std::string> files, at;
     std::string output;
 };
 
-/// "SIGMA:G", or what is wrong with it.
+/// Parses "SIGMA:G"; throws UsageError.
 PlotPoint plot_point(const std::string& text) {
-    PlotPoint point{};
-    int read = 0;
-    if (std::sscanf(text.c_str(), "%lf:%lf%n", &point.sigma, &point.g, &read) != 2 ||
-        static_cast<std::size_t>(read) != text.size() || !std::isfinite(point.sigma) || !std::isfinite(point.g))
-        throw UsageError("plot: --at expected SIGMA:G, such as 2:0.7, found '{}'", text);
-    return point;
+    const std::size_t colon = std::min(text.find(':'), text.size());
+    const auto sigma = parse_number<double>(text.substr(0, colon)),
+               g = parse_number<double>(text.substr(std::min(colon + 1, text.size())));
+    if (!sigma || !g) throw UsageError("plot: --at expected SIGMA:G, such as 2:0.7, found '{}'", text);
+    return {*sigma, *g};
 }
 
-void run_plot(const PlotWords& words) {
-    const std::optional<plot::Format> format = plot::format_of(words.output);
-    if (!format)
-        throw UsageError("plot: -o expected a name that ends in .svg, .png or .html, found '{}'", words.output);
-    const Output output(words.output, words.files);
+void run_plot(const PlotArguments& args) {
+    const std::optional<plot::Format> format = plot::format_of(args.output);
+    if (!format) throw UsageError("plot: -o expected a name that ends in .svg, .png or .html, found '{}'", args.output);
+    const Output output(args.output, args.files);
     print_messages();
     std::vector<PlotPoint> points;
-    for (const std::string& text : words.at) points.push_back(plot_point(text));
+    for (const std::string& text : args.at) points.push_back(plot_point(text));
     std::vector<std::unique_ptr<Source>> sources;
-    for (const std::string& file : words.files) sources.push_back(open_source(file));
-    output.write(plot::draw(lobe_figure(sources, words.files, points), *format));
-    print("{} written\n", words.output);
+    for (const std::string& file : args.files) sources.push_back(open_source(file));
+    output.write(plot::draw(lobe_figure(sources, args.files, points), *format));
+    print("{} written\n", args.output);
 }
 
 // --- export ------------------------------------------------------------------------------------------------------
 
-struct ExportWords {
+struct ExportArguments {
     std::string file, format, output, table = "azimuthal", name = "fur_pack";
 };
 
-/// A C++ header that holds the pack's bytes as medulla::NAME_words, NAME_size: what medulla/default_pack.hpp is made
-/// with. Its namespace and its guard carry the pack's checksum: one pack twice is there once, and two packs of one name
-/// are two for the linker.
+/// A C++ header with the pack's bytes as medulla::NAME_words, NAME_size, such as medulla/default_pack.hpp. Its
+/// namespace and include guard contain the pack's checksum, so that the same pack may be included twice, and two packs
+/// of the same name do not clash in the linker.
 std::string cpp_header(const std::string& file, const std::string& name) {
     std::vector<unsigned char> bytes = read_pack(file);
     const std::string mark = fmt::format("{:016x}", pack_checksum(bytes.data(), bytes.size()));
@@ -69,7 +66,7 @@ std::string cpp_header(const std::string& file, const std::string& name) {
         "// clang-format off\nalignas(16) inline constexpr std::uint64_t {0}_words[{3}] = {{",
         name, mark, size, bytes.size() / 8);
     for (std::size_t i = 0; i < bytes.size(); i += 8) {
-        std::uint64_t word = 0;  // the pack is little-endian, and so must the machine be that uses these words
+        std::uint64_t word = 0;  // little-endian, as must be the machine that uses these words
         for (std::size_t b = 8; b-- > 0;) word = word << 8 | bytes[i + b];
         out += fmt::format("{}0x{:x},", i % 64 == 0 ? "\n" : "", word);
     }
@@ -126,8 +123,7 @@ std::string glsl(const std::string& file, const std::string& name) {
     }
 }
 
-/// What names are made of is followed by _words, _size, _azimuthal ..: no keyword, but what the languages keep for
-/// themselves.
+/// Names get suffixes _words, _size, _azimuthal .., so they cannot be keywords, but may be reserved by the language.
 void check_name_of(const std::string& format, const std::string& name) {
     const bool reserved = name.find("__") != std::string::npos || name.back() == '_';
     if (format == "glsl" && (reserved || name.rfind("gl_", 0) == 0))
@@ -136,46 +132,46 @@ void check_name_of(const std::string& format, const std::string& name) {
         throw UsageError("--name: expected no two underscores, none in front and none at the end, found '{}'", name);
 }
 
-void run_export(const ExportWords& words) {
-    check_name_of(words.format, words.name);
-    const Output output(words.output, {words.file});
+void run_export(const ExportArguments& args) {
+    check_name_of(args.format, args.name);
+    const Output output(args.output, {args.file});
     print_messages();
-    if (words.format == "npy")
-        output.write(npy(words.file, words.table));
-    else if (words.format == "cpp")
-        output.write(cpp_header(words.file, words.name));
+    if (args.format == "npy")
+        output.write(npy(args.file, args.table));
+    else if (args.format == "cpp")
+        output.write(cpp_header(args.file, args.name));
     else
-        output.write(glsl(words.file, words.name));
-    print("{} written\n", words.output);
+        output.write(glsl(args.file, args.name));
+    print("{} written\n", args.output);
 }
 
 }  // namespace
 
 void add_plot(CLI::App& app, Action& action) {
-    add_command<PlotWords>(
+    add_command<PlotArguments>(
         app, action, "plot", "draws lobes with gnuplot; further files dashed over the first, their errors below",
-        [](CLI::App& command, PlotWords& words) {
-            command.add_option("FILE", words.files, "tables files or packs")->required();
-            command.add_option("-o,--output", words.output, "picture: .svg, .png or .html")->required();
+        [](CLI::App& command, PlotArguments& args) {
+            command.add_option("FILE", args.files, "tables files or packs")->required();
+            command.add_option("-o,--output", args.output, "picture: .svg, .png or .html")->required();
             command
-                .add_option("--at", words.at, "SIGMA:G of each column; the nearest nodes of the first file are drawn")
+                .add_option("--at", args.at, "SIGMA:G of each column; the nearest nodes of the first file are drawn")
                 ->default_val(std::vector<std::string>{"0.5:0.3", "2:0.7", "8:0.9"});
         },
         run_plot);
 }
 
 void add_export(CLI::App& app, Action& action) {
-    add_command<ExportWords>(
+    add_command<ExportArguments>(
         app, action, "export", "a pack as a C++ header or as GLSL, or lobes as a numpy array",
-        [](CLI::App& command, ExportWords& words) {
-            command.add_option("FILE", words.file, "pack (cpp, glsl), or tables file or pack (npy)")->required();
-            command.add_option("--format", words.format, "of the output")
+        [](CLI::App& command, ExportArguments& args) {
+            command.add_option("FILE", args.file, "pack (cpp, glsl), or tables file or pack (npy)")->required();
+            command.add_option("--format", args.format, "of the output")
                 ->required()
                 ->check(CLI::IsMember({"cpp", "glsl", "npy"}));
-            command.add_option("-o,--output", words.output, "file to write")->required();
+            command.add_option("-o,--output", args.output, "file to write")->required();
             command
                 .add_option(
-                    "--name", words.name,
+                    "--name", args.name,
                     "for cpp: NAME_words and NAME_size in namespace medulla; for glsl: what its names begin with")
                 ->check([](const std::string& name) -> std::string {
                     const auto letter = [](char c) {
@@ -186,7 +182,7 @@ void add_export(CLI::App& app, Action& action) {
                     return good ? "" : "expected a C++ name, found '" + name + "'";
                 })
                 ->capture_default_str();
-            command.add_option("--table", words.table, "for npy")
+            command.add_option("--table", args.table, "for npy")
                 ->check(CLI::IsMember({"azimuthal", "longitudinal"}))
                 ->capture_default_str();
         },

@@ -1,4 +1,4 @@
-// The subcommands of furtable: each adds its words to the program and sets `action` when it is the one that was typed.
+// The subcommands of furtable: each declares its options and sets `action` when it is selected.
 #pragma once
 
 #include <functional>
@@ -26,19 +26,19 @@ void add_presets(CLI::App& app, Action& action);
 /// All of them.
 void add_commands(CLI::App& app, Action& action);
 
-/// The rows of a LobeError that compress, diff and verify print alike.
+/// Output shared by compress, diff and verify.
 nlohmann::ordered_json to_json(const std::vector<LobeError>& errors);
 void print(const std::vector<LobeError>& errors);
 nlohmann::ordered_json to_json(const PackDegeneracy& degeneracy);
 void print(const PackDegeneracy& degeneracy);
 
-/// A subcommand whose words live in T: declares it, and runs `run(words)` when it is typed.
+/// A subcommand with its arguments in T: declares it, and calls `run(args)` when it is selected.
 template <class T, class Declare, class Run>
 void add_command(CLI::App& app, Action& action, const char* name, const char* help, Declare declare, Run run) {
-    auto words = std::make_shared<T>();
+    auto args = std::make_shared<T>();
     CLI::App* command = app.add_subcommand(name, help);
-    declare(*command, *words);
-    command->callback([&action, words, run] { action = [words, run] { run(*words); }; });
+    declare(*command, *args);
+    command->callback([&action, args, run] { action = [args, run] { run(*args); }; });
 }
 
 }  // namespace medulla::tables

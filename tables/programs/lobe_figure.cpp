@@ -53,7 +53,7 @@ double quantile(std::vector<double> values, double part) {
     return *at;
 }
 
-/// What a row of panels shows: one kind of lobe at one absorption.
+/// The contents of a row of panels: one kind of lobe at one absorption.
 struct RowOf {
     TableKind kind;
     double absorption;
@@ -144,7 +144,7 @@ Panels panels_of(const Sources& sources, const std::vector<std::string>& names, 
             panels.errors.curves.push_back(std::move(error));
         }
     }
-    // Over the colours of all lobes.
+    // Drawn last, over all coloured lobes.
     for (plot::Curve& curve : further) panels.lobes.curves.push_back(std::move(curve));
     // Every lobe of the slab falls to 0 at +-90 degrees: the least of its values would leave no room for the others.
     const double high = most(shown);

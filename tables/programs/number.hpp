@@ -1,5 +1,5 @@
-// Options whose value is a number: decimal, within bounds, nothing after it. What CLI11 itself takes too (nan,
-// hexadecimal, -1 as the greatest unsigned number) is refused by the option's name.
+// Options with a decimal number within bounds. Other text that CLI11 would accept (nan, hexadecimal, -1 as the largest
+// unsigned number) is refused with the name of the option.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -14,7 +14,7 @@
 
 namespace medulla::tables {
 
-/// All of `text` as a decimal number, 1e3 and -0.5 among them; none for nan, inf and what does not fit T.
+/// Parses all of `text` as a decimal number such as 1e3 or -0.5; none for nan, inf and numbers outside T.
 template <class T>
 std::optional<T> parse_number(const std::string& text) {
     const char *first = text.data(), *last = first + text.size();
@@ -27,13 +27,13 @@ std::optional<T> parse_number(const std::string& text) {
     return value;
 }
 
-/// What a number must be. `open`: the ends do not belong to it.
+/// Range of a number; `open`: without its ends.
 template <class T>
 struct Bounds {
     T least = std::numeric_limits<T>::lowest(), most = std::numeric_limits<T>::max();
     bool open = false;
 
-    bool holds(T value) const { return open ? least < value && value < most : least <= value && value <= most; }
+    bool contains(T value) const { return open ? least < value && value < most : least <= value && value <= most; }
     std::string text() const {
         const std::string kind = std::is_floating_point_v<T> ? "a number" : "a whole number";
         const bool no_least = std::is_floating_point_v<T> && least == std::numeric_limits<T>::lowest();
@@ -49,7 +49,7 @@ inline constexpr Bounds<double> above_zero = {0, std::numeric_limits<double>::ma
 template <class T>
 T number_of(const std::string& option, const std::string& text, const Bounds<T>& bounds) {
     const std::optional<T> value = parse_number<T>(text);
-    if (!value || !bounds.holds(*value))
+    if (!value || !bounds.contains(*value))
         throw CLI::ValidationError(option, fmt::format("expected {}, found '{}'", bounds.text(), text));
     return *value;
 }

@@ -7,7 +7,7 @@ namespace medulla::tables {
 
 namespace {
 
-/// What CLI11 says of wrong words; of a command that there is not it says only that one is required.
+/// CLI11's message for wrong arguments; for an unknown command, which it only calls missing, a better one.
 std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
     const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
     if (commands.empty() || !app.get_subcommands().empty()) return error.what();
@@ -17,14 +17,14 @@ std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error, int
                        argc > 1 ? fmt::format("'{}'", argv[1]) : std::string("none"));
 }
 
-/// An empty word, also as `--option=`, is no value of any option: CLI11 2.1 never ends on some short options after one,
-/// and takes the second for an option that was not given.
+/// Refuses empty arguments, also as `--option=`, which no option accepts: CLI11 2.1 loops forever on some short options
+/// after one, and treats the latter as an option that was not given.
 void refuse_empty_words(int argc, char** argv) {
     for (int i = 1; i < argc; ++i) {
         const std::string word = argv[i], before = i > 1 ? argv[i - 1] : "";
         const bool option = before.size() > 1 && before[0] == '-' && before.find('=') == std::string::npos;
         if (word.empty())
-            throw UsageError("{}expected no empty word, found one as number {}", option ? before + ": " : "", i);
+            throw UsageError("{}expected no empty argument, found one as number {}", option ? before + ": " : "", i);
         if (word.rfind("--", 0) == 0 && word.size() > 3 && word.find('=') == word.size() - 1)
             throw UsageError("{}: expected a value, found none", word.substr(0, word.size() - 1));
     }

@@ -1,4 +1,4 @@
-// What both programs share: the words of CLI11, exit statuses, one line for an error.
+// Shared by both programs: command lines by CLI11, exit statuses, one-line error messages.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,26 +9,26 @@
 
 namespace medulla::tables {
 
-/// The words were wrong, though CLI11 took them: exit status 2, as for its own errors.
+/// Wrong arguments that CLI11 accepted: exit status 2, as for its own errors.
 class UsageError : public Error {
   public:
     using Error::Error;
 };
 
-/// It could not be done, and why stands on standard error already: exit status 1 without a further line.
+/// Failure that was already reported on standard error: exit status 1 without a further message.
 class Reported {};
 
-/// Text that came from outside, without line ends and what else a terminal obeys.
+/// External text without line ends and other control characters.
 std::string one_line(std::string text);
 
-/// One line on standard error, whatever stood in a file or a word that `text` quotes.
+/// Prints one line on standard error; replaces control characters that `text` may quote from files or arguments.
 void say(const std::string& program, const std::string& text);
 
 /// "1 node", "2 nodes"
 std::string counted(std::size_t count, const std::string& thing);
 
-/// Parses, runs and turns every error into one line on standard error. 0 done, 1 could not be done, 2 wrong words,
-/// 128 + number of a signal. Status 1 also where standard output cannot take what was printed to it.
+/// Parses, runs and prints every error as one line on standard error. @return exit status: 0 done, 1 failed, 2 wrong
+/// arguments, 128 + number of a signal; also 1 if standard output cannot be written
 int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& action);
 
 }  // namespace medulla::tables

@@ -31,8 +31,8 @@ class Descriptor {
 
 std::string reason() { return std::strerror(errno); }
 
-/// fsync, and whether what was written may be lost. File systems that cannot do it for a file or a folder (CIFS, sshfs,
-/// vboxsf and others, by many names) have done what they can.
+/// fsync. @return false if written data may be lost. File systems without support for files or folders (CIFS, sshfs,
+/// vboxsf and others, with various error codes) count as success.
 bool synced(int fd) {
     for (int tries = 0; tries < 100; ++tries) {
         if (::fsync(fd) == 0) return true;
@@ -80,7 +80,7 @@ void require_readable(const std::string& path) {
 }
 
 std::vector<unsigned char> read_file(const std::string& path, std::uint64_t most) {
-    const Descriptor file(path, O_RDONLY | O_NONBLOCK);  // to open a pipe waits for its writer otherwise
+    const Descriptor file(path, O_RDONLY | O_NONBLOCK);  // without O_NONBLOCK, opening a pipe would wait for its writer
     struct stat info = {};
     if (file.fd < 0 || ::fstat(file.fd, &info) != 0) throw Error("{}: cannot be read: {}", path, reason());
     refuse_other_kinds(path, info.st_mode);
@@ -114,7 +114,7 @@ std::string temporary_name(const std::string& path) {
     const std::string name = last_part(path), folder = path.substr(0, path.size() - name.size());
     std::string temporary;
     struct stat info = {};
-    do {  // a process before us may have had our number, and been killed
+    do {  // a killed process may have had the same number
         const std::string end = fmt::format(".tmp-{}-{}-{}", host, ::getpid(), number++);
         const bool fits = name.size() + end.size() <= longest_name(folder_of(path));
         temporary = folder + (fits ? name : "medulla") + end;
@@ -163,7 +163,7 @@ void write_file(const std::string& path, const std::string& text) { write_file(p
 
 void sync_folder(const std::string& path) {
     const Descriptor folder(path, O_RDONLY | O_DIRECTORY);
-    if (folder.fd < 0) return;  // a folder that may be written but not listed
+    if (folder.fd < 0) return;  // a folder with write but without read permission
     if (!synced(folder.fd)) throw Error("{}: could not be brought to disk: {}", path, reason());
 }
 

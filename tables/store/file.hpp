@@ -1,5 +1,5 @@
-// Whole files, safely: read into memory, and replaced in one step (temporary name, fsync, rename, fsync of the folder).
-// Nothing but a plain file is ever renamed over or removed.
+// Reads whole files, and replaces them atomically (temporary name, fsync, rename, fsync of the folder).
+// Only plain files are ever replaced or removed.
 #pragma once
 
 #include <cstdint>
@@ -10,25 +10,26 @@
 
 namespace medulla::tables {
 
-/// All bytes of a plain file; throws Error that names it, also where it holds more than `most` bytes. Never waits: a
-/// pipe or a device is refused.
+/// All bytes of a plain file. Throws Error that names it, also if it has more than `most` bytes. Pipes and devices are
+/// refused, so that it never blocks.
 std::vector<unsigned char> read_file(const std::string& path,
                                      std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
 
-/// Throws Error that says why, unless `path` is a plain file that can be read.
+/// Throws Error with the reason unless `path` is a readable plain file.
 void require_readable(const std::string& path);
 
-/// `<path>.tmp-<host>-<process>-<number>`: no two processes of a cluster make the same one. Where such a name is longer
-/// than the folder takes, one without the file's own name.
+/// `<path>.tmp-<host>-<process>-<number>`: unique among the processes of a cluster. Without the file's
+/// name if that would be too long for the folder.
 std::string temporary_name(const std::string& path);
 
-/// Throws Error where the last part of `path` is longer than its folder takes.
+/// Throws Error if the last part of `path` is too long for its folder.
 void check_name(const std::string& path);
 
-/// A plain file that appears under its name only when commit() is called, whole and on disk; otherwise nothing is left.
+/// A plain file that appears under its name, complete and on disk, when commit() is called. Without commit() nothing is
+/// left.
 class PendingFile {
   public:
-    /// Makes the temporary file; by default beside `path`, always on its file system.
+    /// Creates the temporary file, by default beside `path`; it must be on the same file system.
     explicit PendingFile(std::string path, std::string temporary = {});
     ~PendingFile();
     PendingFile(const PendingFile&) = delete;
@@ -46,10 +47,10 @@ class PendingFile {
 void write_file(const std::string& path, const void* data, std::size_t size);
 void write_file(const std::string& path, const std::string& text);
 
-/// Brings a folder's list of names to disk, where its file system can. Throws Error where that failed.
+/// Synchronises a folder with the disk, if its file system supports that. Throws Error on failure.
 void sync_folder(const std::string& path);
 
-/// Folder of a path: "." where it names none.
+/// Folder of a path, "." if it has none.
 std::string folder_of(const std::string& path);
 
 /// "folder", "pipe", "block device" .. of a file mode.

@@ -14,7 +14,7 @@ const char* option_of(const std::string& axis) {
     return axis == "h" ? "--h-range" : "--theta-range";
 }
 
-/// LO:HI:N as it is typed, in degrees for theta_i.
+/// LO:HI:N as on the command line, in degrees for theta_i.
 std::string range_text(const Axis& axis) {
     const double unit = axis.name == "theta_i" ? 180 / pi : 1;
     return fmt::format("{:.10g}:{:.10g}:{}", axis.values.front() * unit, axis.values.back() * unit, axis.size());
@@ -39,12 +39,12 @@ class Differences {
             if (!axis_rule(axis.name).bins && axis.name != "side") add(axis, found);
         if (found.has_axis("absorption") && !expected.has_axis("absorption"))
             add(option_of("absorption"), "none", range_text(found.axis("absorption")));
-        const std::size_t half = expected.sides();  // of the circle that --bins cuts
+        const std::size_t half = expected.sides();  // --bins counts those of the full circle
         add("--bins", fmt::format("{}", half * expected.bins()), fmt::format("{}", half * found.bins()));
         add("--method", expected.method, found.method);
         add("--target-error", or_none(expected.target_error), or_none(found.target_error));
         add("--time-budget", or_none(expected.time_budget), or_none(found.time_budget));
-        // Both are 0 where they have no meaning, which the options above say.
+        // Both are 0 where they have no meaning.
         if (expected.paths > 0 && found.paths > 0)
             add("--paths", fmt::format("{}", expected.paths), fmt::format("{}", found.paths));
         if (expected.method == found.method)
@@ -60,11 +60,11 @@ class Differences {
         const Axis& found = table.axis(expected.name);
         if (found.values == expected.values) return;
         if (range_text(expected) != range_text(found)) return add(option, range_text(expected), range_text(found));
-        // The same range: another --scene left other nodes of it, or other ends round to the same text.
+        // The same range with different nodes: from another --scene, or from ends that round to the same text.
         for (std::size_t i = 0; i < found.size(); ++i)
             if (found.values[i] != expected.values[i])
                 return add(option, fmt::format("{:.17g} as node {} of {}", expected.values[i], i + 1, expected.size()),
-                           fmt::format("{:.17g} (another --scene leaves other nodes)", found.values[i]));
+                           fmt::format("{:.17g} (another --scene uses other nodes)", found.values[i]));
     }
 
     std::string text_;

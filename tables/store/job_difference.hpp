@@ -1,4 +1,4 @@
-// What tells two jobs apart, in the options of medulla-precompute.
+// The difference of two jobs, in options of medulla-precompute.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace medulla::tables {
 
-/// "--bins: expected 72, found 36; --seed: expected 1, found 2": every option in which the plan that was found differs
-/// from the one that is expected. Empty where no option does.
+/// Every option in which two plans differ, as in "--bins: expected 72, found 36; --seed: expected 1, found 2". Empty if
+/// none does.
 std::string job_difference(const Tables& expected, const Tables& found);
 
 }  // namespace medulla::tables

@@ -1,5 +1,5 @@
-// JSON and text from outside: parsed only as deep as ours ever is, since walking over it (dump, copies) recurses; names
-// of files are bytes, of which JSON holds only UTF-8.
+// External JSON and text. JSON is parsed to a limited depth, since nlohmann::json recurses in dump and copies. File
+// names are bytes, but JSON is UTF-8.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,17 +11,16 @@ namespace medulla::tables {
 
 inline constexpr int deepest_json = 8;
 
-/// Bytes as text that JSON holds and from which they can be told again: a byte that is no part of a UTF-8 character is
-/// written \xHH, a backslash as two.
+/// Bytes as UTF-8, reversibly: a byte that is not part of a UTF-8 character becomes \xHH, a backslash two.
 std::string json_name(const std::string& bytes);
 
-/// JSON on one line, whatever bytes its strings hold: what is no UTF-8 there becomes U+FFFD.
+/// JSON on one line; bytes of strings that are not UTF-8 become U+FFFD.
 template <class Json>
 std::string json_line(const Json& json) {
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-/// Throws Error that begins with `where` for text that is no JSON or nests deeper than deepest_json.
+/// Throws Error that begins with `where` for text that is not JSON or is nested deeper than deepest_json.
 template <class Json = nlohmann::json>
 Json parse_json(const char* first, const char* last, const std::string& where) {
     int depth = 0;
@@ -34,7 +33,7 @@ Json parse_json(const char* first, const char* last, const std::string& where) {
     try {
         return Json::parse(first, last, shallow);
     } catch (const typename Json::exception& error) {
-        // Its message repeats what it read, whatever bytes these are.
+        // The message quotes the input, which may be any bytes.
         std::string text = error.what();
         for (char& c : text)
             if (c < ' ' || c > '~') c = '?';

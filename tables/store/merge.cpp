@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 /// One argument: its axes and the slices that it has.
 struct Input {
     std::string path;
-    Tables tables;                        ///< arrays are empty where `folder` is set
+    Tables tables;                        ///< without arrays if `folder` is set
     std::unique_ptr<SliceFolder> folder;  ///< refers to `tables`
 
     std::vector<SliceId> available() const {
@@ -100,7 +100,7 @@ std::uint32_t index_of(const Axis& axis, double value) {
                                       axis.values.begin());
 }
 
-/// The cells of `to` that the cells of one slice of `from` are.
+/// Indices in `to` of the cells of a slice of `from`.
 std::vector<std::size_t> places(const Table& from, const SliceId& id, const Table& to) {
     const std::size_t cells = slice_cells(from), first = (id.sigma * from.axis("g").size() + id.g) * cells;
     std::vector<std::size_t> list(cells);
@@ -119,7 +119,7 @@ void put_cell(const Slice& slice, std::size_t c, Table& table, std::size_t cell)
     for (std::size_t a = 0; a < from.size(); ++a) (*to[a])[cell] = (*from[a])[c];
 }
 
-/// Whether a cell holds the same bytes.
+/// Whether a cell has the same bytes.
 bool same_cell(const Slice& slice, std::size_t c, const Table& table, std::size_t cell) {
     const auto ours = cell_arrays(slice);
     const auto theirs = cell_arrays(table);

@@ -1,4 +1,4 @@
-// Parts of a job -> one table: shard folders of many workers, and tables files that each hold a part of the axes.
+// Merges parts of a job: slice files of many workers, and tables files that cover parts of the axes.
 #pragma once
 
 #include <string>
@@ -8,10 +8,10 @@
 
 namespace medulla::tables {
 
-/// Merges shard folders (named themselves, or by the output they belong to) and tables files. All parts must agree in
-/// program, method, when a cell is done, and the exit axis; the result has the union of their other axes' nodes, and
-/// equals what one process would have made. Throws Error where parts disagree, where two hold different values of one
-/// cell, and where one is missing.
+/// Merges folders of slice files (given by their name or by their output) and tables files. All parts must have the
+/// same program, method, stopping rule and exit axis. The result has the union of the nodes of the other axes and
+/// equals the result of a single process. Throws Error if parts disagree, if two have different values of a cell, or if
+/// a cell is missing.
 Tables merge(const std::vector<std::string>& parts);
 
 }  // namespace medulla::tables

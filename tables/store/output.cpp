@@ -22,18 +22,18 @@
 namespace medulla::tables {
 namespace {
 
-constexpr int most_links = 40;  // as many as Linux follows
+constexpr int most_links = 40;  // the limit of Linux
 constexpr int reader_ms = 1000;
 
 std::string reason() { return std::strerror(errno); }
 
 [[noreturn]] void cannot(const std::string& path) { throw Error("{}: cannot be written: {}", path, reason()); }
 
-/// Where a path leads to, and what is there.
+/// Target of a path, and its kind.
 struct Place {
     std::string path;
-    mode_t mode = 0;         ///< 0: nothing yet
-    bool open_file = false;  ///< one of /proc's links to files that a process has open: its text need not be a path
+    mode_t mode = 0;         ///< 0: does not exist
+    bool open_file = false;  ///< a link in /proc to an open file of a process, whose text may not be a path
 };
 
 bool on_proc(const std::string& folder) {
@@ -68,7 +68,7 @@ Place place_of(const std::string& path) {
     cannot(path);
 }
 
-/// A plain file is renamed into its folder, so that is what must be writable; one that its owner protects stays.
+/// A plain file is renamed into its folder, so the folder must be writable; a write-protected file is not replaced.
 void check_plain(const Place& place, const std::string& path) {
     const std::string folder = folder_of(place.path);
     struct stat info = {};
@@ -80,7 +80,7 @@ void check_plain(const Place& place, const std::string& path) {
     if (place.mode != 0 && ::faccessat(AT_FDCWD, place.path.c_str(), W_OK, AT_EACCESS) != 0) cannot(path);
 }
 
-/// Another descriptor of a file that this process has open, which shares its position; none where it is no such file.
+/// A second descriptor of a file that this process has open, with the same position; none if it is not open.
 std::optional<int> own_descriptor(const Place& place) {
     std::error_code none;
     if (!place.open_file || !std::filesystem::equivalent(folder_of(place.path), "/proc/self/fd", none))
@@ -94,7 +94,7 @@ std::optional<int> own_descriptor(const Place& place) {
     return -1;
 }
 
-/// Waits a moment for the reader of a pipe, which whoever starts both may start second.
+/// Waits briefly for the reader of a pipe, since the reader may be started after the writer.
 int open_pipe(const Place& place) {
     for (int waited = 0;; ++waited) {
         const int fd = ::open(place.path.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
@@ -118,7 +118,7 @@ bool is_null(int fd) {
 
 Output::Output(std::string path, const std::vector<std::string>& inputs) : path_(std::move(path)) {
     for (const std::string& input : inputs) {
-        std::error_code none;  // a file that is not there yet is no input
+        std::error_code none;  // a file that does not exist yet is no input
         if (std::filesystem::equivalent(path_, input, none))
             throw Error("{}: expected another output than the input, found {}", path_, input);
     }

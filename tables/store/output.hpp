@@ -1,5 +1,5 @@
-// Where a program's product goes, checked before the work starts: a plain file is replaced in one step, a device or a
-// pipe is written to as what it is.
+// The output of a program, checked before the work starts: a plain file is replaced atomically, a device or a pipe is
+// written to directly.
 #pragma once
 
 #include <cstddef>
@@ -10,30 +10,31 @@ namespace medulla::tables {
 
 class Output {
   public:
-    /// Follows symbolic links. Throws Error for what could not be written in the end: a folder, a block device or a
-    /// socket; a folder around it that is missing or cannot be written; a name that is too long; a pipe that nobody
-    /// reads; standard error, where messages go; one of `inputs`. Where it is standard output itself, all that is
-    /// printed goes to standard error from now on.
+    /// Follows symbolic links. Throws Error for an output that could not be written later: a folder, a block device or
+    /// a socket; a missing or read-only folder; a name that is too long; a pipe without a reader; standard error, which
+    /// is for messages; one of `inputs`. If it is standard output, everything printed goes to standard error from then
+    /// on.
     explicit Output(std::string path, const std::vector<std::string>& inputs = {});
     ~Output();
     Output(const Output&) = delete;
     Output& operator=(const Output&) = delete;
 
-    /// As the user wrote it.
+    /// As given by the user.
     const std::string& path() const { return path_; }
 
-    /// Throws Error unless it is a plain file, or will be one: where something is kept beside it.
+    /// Throws Error unless it is a plain or a new file; required if other files are stored beside it.
     void require_plain() const;
 
-    /// Once: all of it. `temporary`: name of a plain file while it is written, used where it is on the same file
-    /// system; empty: one beside it.
+    /// Writes everything; call it once.
+    /// @param temporary name of a plain file while it is written, used if it is on the same file system; empty: a name
+    /// beside the output
     void write(const void* data, std::size_t size, const std::string& temporary = {}) const;
     void write(const std::string& text) const { write(text.data(), text.size()); }
 
   private:
-    std::string path_, target_;  ///< target_: without symbolic links
+    std::string path_, target_;  ///< target_: path_ with symbolic links resolved
     const char* kind_ = "plain file";
-    int fd_ = -1;  ///< of what is not replaced
+    int fd_ = -1;  ///< of an output that is written to directly
 };
 
 }  // namespace medulla::tables

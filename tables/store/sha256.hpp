@@ -1,4 +1,4 @@
-// SHA-256 (FIPS 180-4) of what we write, by OpenSSL's libcrypto: what a file must hold to be what it says it is.
+// SHA-256 (FIPS 180-4) by OpenSSL's libcrypto.
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ class Sha256 {
     Sha256& operator=(const Sha256&) = delete;
 
     void add(const void* data, std::size_t size);
-    /// Ends the message; the object is of no further use.
+    /// Ends the message; the object must not be used again.
     Digest finish();
 
   private:

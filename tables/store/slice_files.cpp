@@ -32,7 +32,7 @@ bool ends_with(const std::string& text, const std::string& end) {
     return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-/// A file made by temporary_name() for something of ours, left by a killed run.
+/// A temporary file of a job, left by a killed run.
 bool is_temporary(const std::string& name) {
     const std::size_t at = name.find(".tmp-");
     return at != std::string::npos && (ends_with(name.substr(0, at), suffix) ||
@@ -44,13 +44,14 @@ std::vector<std::string> names_in(const std::string& folder) {
     std::error_code error;
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
         names.push_back(entry->path().filename().string());
+    if (error == std::errc::not_a_directory) throw Error("{}: expected a folder, found another kind of file", folder);
     if (error && error != std::errc::no_such_file_or_directory)
         throw Error("{}: cannot be read: {}", folder, error.message());
     std::sort(names.begin(), names.end());
     return names;
 }
 
-/// Removes a file of ours; what is no plain file is not.
+/// Removes a file of the job, if it is a plain file.
 void remove_plain(const std::string& file) {
     struct stat info = {};
     if (::lstat(file.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) return;
@@ -60,7 +61,7 @@ void remove_plain(const std::string& file) {
 struct Inspected {
     std::vector<unsigned char> bytes;
     SliceFileHeader header = {};
-    std::string damage;  ///< empty: whole
+    std::string damage;  ///< empty: none
 
     Digest configuration() const {
         Digest digest;
@@ -69,7 +70,7 @@ struct Inspected {
     }
 };
 
-/// Reads a shard of whatever configuration and checks that it is what was written.
+/// Reads a slice file of any configuration and checks its integrity.
 Inspected inspect(const std::string& path) {
     Inspected found;
     found.bytes = read_file(path, greatest_slice_file);
@@ -117,18 +118,15 @@ std::vector<std::string> SliceFolder::files() const {
 }
 
 void SliceFolder::open(bool alone) {
-    struct stat info = {};
     if (::mkdir(path_.c_str(), 0777) == 0)
         sync_folder(folder_of(path_));
     else if (errno != EEXIST)
         throw Error("{}: cannot be made: {}", path_, std::strerror(errno));
-    else if (::stat(path_.c_str(), &info) == 0 && !S_ISDIR(info.st_mode))
-        throw Error("{}: expected a folder, found a {}", path_, kind_name(info.st_mode));
     lock_ = ::open((path_ + "/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (lock_ < 0) throw Error("{}/lock: cannot be written: {}", path_, std::strerror(errno));
     if (::flock(lock_, (alone ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0) {
         if (errno == EWOULDBLOCK) throw Error("{}: another medulla-precompute is at work on it", path_);
-        // A file system without locks (ENOLCK, ENOSYS, EOPNOTSUPP) is no reason not to work on it.
+        // Works without a lock on file systems that have none (ENOLCK, ENOSYS, EOPNOTSUPP).
         note("{}: this file system has no locks ({}): start no second run there\n", path_, std::strerror(errno));
     }
     alone_ = alone;
@@ -141,7 +139,7 @@ void SliceFolder::open(bool alone) {
         const std::vector<unsigned char> bytes = read_file(json, greatest_configuration);
         const std::string text(bytes.begin(), bytes.end());
         if (text == configuration_text_) return;
-        // Its shards say whose the folder is; without any, a whole run takes it over.
+        // Slice files decide whose folder it is; without any, a complete run takes it over.
         for (const std::string& file : files()) {
             const Inspected found = inspect(file);
             if (found.damage.empty()) refuse_other(file, found.configuration());
@@ -157,7 +155,7 @@ void SliceFolder::refuse_other(const std::string& file, const Digest& found) con
     try {
         const Tables other = read_configuration(path_);
         if (configuration_hash(other) == found) difference = job_difference(plan_, other);
-    } catch (const Error&) {  // then nothing is left that names that job's options
+    } catch (const Error&) {  // then that job's options are unknown
     }
     if (difference.empty()) difference = "expected the options of this job, found others";
     throw Error("{}: it belongs to another job: {}", file, difference);
@@ -176,7 +174,7 @@ std::optional<Slice> SliceFolder::read(const SliceId& id, std::string& why) cons
     if (header.version != slice_file_version || header.table != static_cast<std::uint32_t>(id.table) ||
         header.sigma != id.sigma || header.g != id.g || header.cells != slice.cells || header.bins != slice.bins ||
         found.bytes.size() != size) {
-        why = "it holds another slice than its name says";
+        why = "its slice is not the one of its name";
         return std::nullopt;
     }
     const unsigned char* from = found.bytes.data() + sizeof header;
@@ -229,7 +227,7 @@ void SliceFolder::remove() {
     for (const std::string& name : names_in(path_))
         if (ends_with(name, suffix) || is_temporary(name) || name == "configuration.json" || name == "lock")
             remove_plain(path_ + "/" + name);
-    // NFS keeps a file that is open under another name, until it is closed.
+    // NFS renames a removed file that is still open, until it is closed.
     if (lock_ >= 0) ::close(std::exchange(lock_, -1));
     const bool kept = ::rmdir(path_.c_str()) != 0 && errno != ENOENT && errno != ENOTEMPTY && errno != EEXIST;
     if (kept && errno != ENOTDIR)  // a symbolic link to the folder
@@ -285,7 +283,7 @@ Tables read_configuration(const std::string& folder) {
     } catch (const nlohmann::json::exception& error) {
         throw Error("{}: expected a job's configuration: {}", path, error.what());
     }
-    // What was read must be the text that we would write: nothing of it is lost or misread.
+    // The text must equal what would be written for it, so that nothing was lost or misread.
     if (configuration_text(plan) != std::string(bytes.begin(), bytes.end()))
         throw Error("{}: expected a job's configuration as medulla-precompute writes it, found other text", path);
     return plan;

@@ -7,7 +7,7 @@
 #include "tables/error.hpp"
 #include "tables/store/json_text.hpp"
 
-static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "shards and hashes are little-endian, copied as they lie");
+static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "slice files and hashes are little-endian copies of memory");
 
 namespace medulla::tables {
 namespace {
@@ -74,7 +74,7 @@ std::string configuration_text(const Tables& plan) {
         out["method"] = json_name(table->method);
         out["seed"] = table->seed;
         out["paths"] = table->paths;
-        // Only where they are set: a job without them keeps its text.
+        // Only if set, so that the text of jobs without them does not change.
         if (table->target_error > 0) out["target_error"] = fmt::format("{:a}", table->target_error);
         if (table->time_budget > 0) out["time_budget"] = fmt::format("{:a}", table->time_budget);
         for (const Axis& axis : table->axes) {

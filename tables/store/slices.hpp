@@ -1,5 +1,5 @@
-// A job cut into slices: one (sigma, g) of one table, which is solved, kept and checked on its own. Also the two
-// hashes: of a job's configuration (all that decides its bytes) and of a table's contents.
+// Slices: the cells of one (sigma, g) of a table, which are solved, stored and checked together. And two hashes: of a
+// job's configuration (everything that decides its bytes) and of the contents of tables.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@ namespace medulla::tables {
 /// Most numbers in the lobes of one slice, which is one chunk of the tables file.
 inline constexpr std::size_t most_slice_values = 4096 * 4096;
 
-/// Place of a slice: indices into the table's sigma and g axes.
+/// A slice: its table and its indices on the sigma and g axes.
 struct SliceId {
     TableId table = TableId::azimuthal;
     std::uint32_t sigma = 0, g = 0;
@@ -22,7 +22,7 @@ struct SliceId {
     bool operator==(const SliceId& other) const { return table == other.table && sigma == other.sigma && g == other.g; }
 };
 
-/// What is solved for one slice; arrays as in Table, for the cells of the slice.
+/// Results of one slice; arrays as in Table, for the cells of the slice.
 struct Slice {
     std::size_t cells = 0, bins = 0;
     std::vector<float> lobe;                                                ///< [cells][bins]
@@ -32,19 +32,19 @@ struct Slice {
     Slice(std::size_t cell_count, std::size_t bin_count);  ///< zeros
 };
 
-/// The arrays of a table or slice in the order of shards, hashes and copies.
+/// The per-cell arrays of a table or slice, in the order of files and hashes.
 template <class T>
 auto cell_arrays(T& of) {
     return std::array{&of.energy, &of.energy_error, &of.standard_error, &of.mean_length};
 }
 
-/// Cells of one slice of a table: everything behind sigma and g but the exit direction.
+/// Number of cells of a slice: all axes except sigma, g and the exit direction.
 std::size_t slice_cells(const Table& table);
 
-/// All slices of the tables present, azimuthal first, g fastest. `plan` needs its axes only.
+/// All slices of the tables present, azimuthal first, g fastest. Only the axes of `plan` are used.
 std::vector<SliceId> slices_of(const Tables& plan);
 
-/// Copies a slice into its place in an allocated table, or out of it.
+/// Copies a slice into an allocated table, or out of it.
 void put_slice(Tables& tables, const SliceId& id, const Slice& slice);
 Slice take_slice(const Tables& tables, const SliceId& id);
 

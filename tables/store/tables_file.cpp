@@ -21,10 +21,10 @@ namespace {
 
 constexpr const char* format_name = "medulla tables";
 constexpr std::uint64_t format_version = 2, first_with_hash = 2;
-constexpr std::size_t image_step = std::size_t{1} << 24;  // bytes by which a file in memory grows
+constexpr std::size_t image_step = std::size_t{1} << 24;  // growth of a file in memory [bytes]
 constexpr unsigned zstd_level = 9;
 constexpr std::size_t longest_text = 65536;
-constexpr std::size_t most_expansion = 1 << 15;  // zstd: 128 KiB of equal bytes are a block of 4 bytes
+constexpr std::size_t most_expansion = 1 << 15;  // of zstd: 128 KiB of equal bytes become a block of 4 bytes
 
 /// An HDF5 id that closes itself.
 class Handle {
@@ -46,7 +46,7 @@ void check(herr_t status, const std::string& what) {
     if (status < 0) throw Error("{}", what);
 }
 
-/// A file in memory as HDF5 leaves it when it closes it. (H5Fget_file_image gives one that is marked as being written.)
+/// Captures a file in memory when HDF5 closes it. (H5Fget_file_image returns one that is marked as open for writing.)
 struct Image {
     unsigned char* bytes = nullptr;
     std::size_t size = 0;
@@ -79,7 +79,7 @@ struct Image {
     }
 };
 
-/// HDF5's own error printing is replaced by our one line.
+/// Disables HDF5's own error messages.
 void quiet() {
     static std::once_flag once;
     std::call_once(once, [] { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); });
@@ -88,7 +88,7 @@ void quiet() {
 // --- writing ---------------------------------------------------------------------------------------------------
 
 Handle untracked(hid_t kind, const std::string& where) {
-    // Times would make two equal runs differ.
+    // Without time stamps, so that equal runs give equal files.
     const hid_t id = H5Pcreate(kind);
     if (id >= 0) H5Pset_obj_track_times(id, 0);
     return Handle(id, H5Pclose, where + ": HDF5 gives no property list");
@@ -123,7 +123,7 @@ void write_attribute(hid_t object, const char* name, double value, const std::st
     write_number(object, name, {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE}, &value, where);
 }
 
-/// Writes one array in chunks, each with a checksum, whatever the compression: no flipped bit is read silently.
+/// Writes one array in chunks, each with a checksum for any compression, so that every flipped bit is detected.
 void write_array(hid_t group, const std::string& name, const std::vector<hsize_t>& shape, const NumberType& type,
                  const void* data, Compression compression, const std::vector<hsize_t>& chunk,
                  const std::string& where) {
@@ -209,7 +209,7 @@ void write_table(hid_t file, const Table& table, Compression compression, const 
 
 // --- reading ---------------------------------------------------------------------------------------------------
 
-/// One value of an attribute: whatever HDF5 calls a string, of fixed or variable length, padded in any way.
+/// One attribute value of any HDF5 string type: fixed or variable length, with any padding.
 std::string read_text(hid_t object, const char* name, const std::string& where) {
     const std::string failed = fmt::format("{}: expected text in attribute {}, found none", where, name);
     const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, failed);
@@ -243,7 +243,7 @@ std::uint64_t read_whole(hid_t object, const char* name, const std::string& wher
     const Handle space(H5Aget_space(attribute), H5Sclose, failed);
     if (H5Tget_class(type) != H5T_INTEGER || H5Sget_simple_extent_npoints(space) != 1) throw Error("{}", failed);
     if (H5Tget_sign(type) == H5T_SGN_2) {
-        std::int64_t number = 0;  // HDF5 would make 0 of what is below it
+        std::int64_t number = 0;  // HDF5 would convert negative numbers to 0
         check(H5Aread(attribute, H5T_NATIVE_INT64, &number), failed);
         if (number < 0) throw Error("{}: expected 0 or more in attribute {}, found {}", where, name, number);
     }
@@ -252,7 +252,7 @@ std::uint64_t read_whole(hid_t object, const char* name, const std::string& wher
     return value;
 }
 
-/// A positive number, 0 where there is none.
+/// A positive number, 0 if the attribute is missing.
 double read_optional(hid_t object, const char* name, const std::string& where) {
     const htri_t exists = H5Aexists(object, name);
     if (exists == 0) return 0;
@@ -276,8 +276,8 @@ std::string shape_text(const std::vector<hsize_t>& shape) {
     return text;
 }
 
-/// Throws Error unless a dataset is stored as write_array stores it: chunks within the array, numbers of at most 8
-/// bytes, our filters alone. HDF5 allocates what these say before it reads.
+/// Throws Error unless a dataset is stored as by write_array: chunks within the array, numbers of at most 8 bytes, only
+/// the filters used there. HDF5 allocates memory by these properties before it reads.
 void check_storage(hid_t set, hid_t type, const std::vector<hsize_t>& shape, const std::string& where) {
     const Handle properties(H5Dget_create_plist(set), H5Pclose, where + ": cannot be read");
     std::vector<hsize_t> chunk(shape.size());
@@ -296,7 +296,7 @@ void check_storage(hid_t set, hid_t type, const std::vector<hsize_t>& shape, con
             H5Pget_filter2(properties, static_cast<unsigned>(i), &flags, &count, nullptr, 0, nullptr, &config);
         if (id != H5Z_FILTER_SHUFFLE && id != H5Z_FILTER_DEFLATE && id != H5Z_FILTER_FLETCHER32 && id != zstd_filter_id)
             throw Error("{}: expected shuffle, gzip, zstd and Fletcher-32 filters, found filter {}", where, id);
-        // One after another they would multiply how far few bytes expand: gzip alone 1032 times, zstd to one chunk.
+        // Only one compression: in sequence their expansion factors multiply (gzip alone 1032, zstd up to a chunk).
         compressors += id == H5Z_FILTER_DEFLATE || id == zstd_filter_id;
         if (compressors > 1) throw Error("{}: expected one compression, found several", where);
     }
@@ -322,7 +322,7 @@ std::vector<T> read_array(hid_t group, const std::string& name, hid_t memory, co
     check_storage(set, type, shape, fmt::format("{}/{}", where, name));
     std::size_t count = 1;
     for (const hsize_t n : shape) count *= n;
-    // What a file declares it must also hold: a damaged one cannot make us allocate more than its bytes can expand to.
+    // Limits memory for damaged files: at most what the stored bytes can expand to.
     const hsize_t stored = H5Dget_storage_size(set);
     if (count * sizeof(T) > most_expansion * stored + 4096)
         throw Error("{}/{}: expected data, found {} bytes for shape {}", where, name, stored, shape_text(shape));
@@ -383,9 +383,9 @@ void write_tables(const Output& output, const Tables& tables, Compression compre
     const std::string& path = output.path();
     quiet();
     register_zstd_filter();
-    // Nothing is written that would be refused when it is read.
+    // Nothing is written that reading would refuse.
     for (const Table* table : tables.present()) check_cells(*table, fmt::format("{}: /{}", path, table->name()));
-    // The file is made in memory and written by us: HDF5 closes a file on a full disk without a word.
+    // HDF5 writes to memory only, since it closes a file on a full disk without an error.
     Image image;
     {
         const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, path + ": HDF5 gives no property list");
@@ -427,8 +427,8 @@ Tables read_tables(const std::string& path) {
     }
     const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, path + ": HDF5 gives no property list");
 #if H5_VERSION_GE(1, 10, 7)
-    // Without a lock, which some file systems have not (ENOLCK, ENOSYS): our files appear whole under their names, and
-    // SHA-256 tells if somebody writes into one.
+    // Without a lock, which some file systems do not support (ENOLCK, ENOSYS): files appear complete under their names,
+    // and the SHA-256 detects a concurrent writer.
     check(H5Pset_file_locking(access, false, true), path + ": HDF5 gives no property list");
 #endif
     const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access), H5Fclose, path + ": damaged HDF5 file");

@@ -10,7 +10,7 @@ namespace medulla::tables {
 
 enum class Compression { none, gzip, zstd };
 
-/// Writes a file with these tables, in one step. Two equal `Tables` give the same bytes. `temporary`: as in Output.
+/// Writes a file with these tables atomically. Equal `Tables` give the same bytes. `temporary`: as in Output.
 void write_tables(const Output& output, const Tables& tables, Compression compression,
                   const std::string& temporary = {});
 void write_tables(const std::string& path, const Tables& tables, Compression compression);
@@ -19,7 +19,7 @@ void write_tables(const std::string& path, const Tables& tables, Compression com
 /// the contents. Throws Error.
 Tables read_tables(const std::string& path);
 
-/// True if it is a plain file that begins with HDF5's signature.
+/// Whether it is a plain file that starts with the signature of HDF5.
 bool is_hdf5(const std::string& path);
 
 }  // namespace medulla::tables

@@ -31,7 +31,7 @@ double number(const std::string& text, const std::string& option, const std::str
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
         throw Error("{}: expected LO:HI or LO:HI:N, found '{}'", option, whole);
-    return value;
+    return value + 0.0;  // -0 is 0: equal axes are the same bytes and the same job
 }
 
 }  // namespace

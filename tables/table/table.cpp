@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim2d/disc/single.hpp"
-#include "sim2d/slab/single.hpp"
+#include "medulla/lookup.hpp"
 #include "tables/error.hpp"
 
 namespace medulla::tables {
@@ -80,9 +79,9 @@ std::vector<const Table*> Tables::present() const {
 
 std::optional<double> closed_form_energy(const Table& table, std::size_t cell) {
     if (table.id == TableId::longitudinal)
-        return sim2d::slab_energy(table.parameter(cell, "sigma"), table.parameter(cell, "theta_i"));
+        return longitudinal_energy(table.parameter(cell, "sigma"), table.parameter(cell, "theta_i"));
     if (table.has_axis("absorption") && table.parameter(cell, "absorption") > 0) return std::nullopt;
-    return sim2d::disc_energy(table.parameter(cell, "sigma"), table.parameter(cell, "h"));
+    return azimuthal_energy(table.parameter(cell, "sigma"), table.parameter(cell, "h"));
 }
 
 namespace {
@@ -92,7 +91,7 @@ namespace {
 template <class Fail>
 void check_absorbed(const Table& table, std::size_t cell, const Fail& fail) {
     const double sigma = table.parameter(cell, "sigma"), a = table.parameter(cell, "absorption"),
-                 most = sigma / (sigma + a) * sim2d::disc_energy(sigma + a, table.parameter(cell, "h"));
+                 most = sigma / (sigma + a) * azimuthal_energy(sigma + a, table.parameter(cell, "h"));
     const double energy = table.energy[cell], error = table.energy_error[cell];
     if (!(energy <= most + 5 * error + 1e-12))
         fail(fmt::format("expected an energy of at most {:.9g}, found {:.9g} with standard error {:.2e}", most, energy,
@@ -123,9 +122,14 @@ void check_cells(const Table& table, const std::string& where) {
         }
         // A sum of floats, each with a relative rounding of 2^-24.
         if (!(std::abs(sum - 1) <= 1e-6)) fail(fmt::format("expected a lobe of integral 1, found {:.9g}", sum));
-        for (const auto* array : {&table.energy, &table.energy_error, &table.standard_error, &table.mean_length})
-            if (!((*array)[cell] >= 0))
-                fail(fmt::format("expected an energy, errors and a length >= 0, found {:g}", (*array)[cell]));
+        for (const double error : {table.energy_error[cell], table.standard_error[cell]})
+            if (!(error >= 0 && std::isfinite(error)))
+                fail(fmt::format("expected finite errors >= 0, found {:g}", error));
+        if (!(table.energy[cell] >= 0 && table.energy[cell] <= 1 + 5 * table.energy_error[cell] + 1e-12))
+            fail(fmt::format("expected an energy in [0, 1], found {:g} with standard error {:.2e}", table.energy[cell],
+                             table.energy_error[cell]));
+        if (!(table.mean_length[cell] >= 0))
+            fail(fmt::format("expected a length >= 0, found {:g}", table.mean_length[cell]));
         if (cell % sides != 0) continue;
         double energy = 0, variance = 0;
         for (std::size_t s = 0; s < sides; ++s) {
@@ -171,12 +175,12 @@ std::vector<double> survival_lengths(const Table& table) {
     std::vector<double> lengths = table.mean_length;
     const std::vector<double>&sigma = table.axis("sigma").values, &absorption = table.axis("absorption").values,
           &h = table.axis("h").values;
-    const auto unknown = [&](double s, double offset) { return !(sim2d::disc_energy(s, offset) > 0); };
+    const auto unknown = [&](double s, double offset) { return !(azimuthal_energy(s, offset) > 0); };
     for (std::size_t cell = 0; cell < table.cells(); ++cell) {
         const double a = table.parameter(cell, "absorption"), s = table.parameter(cell, "sigma"),
                      offset = table.parameter(cell, "h");
         if (a == 0 || unknown(s, offset)) continue;
-        const double left = table.energy[cell] / sim2d::disc_energy(s, offset);
+        const double left = table.energy[cell] / azimuthal_energy(s, offset);
         if (!(left > 0)) throw Error("table {}: {}: expected an energy > 0", table.name(), table.describe(cell));
         lengths[cell] = -std::log(left) / a;
     }

@@ -9,7 +9,7 @@ static_assert(sizeof(Tables) == 280 && alignof(Tables) == 8, "layout");
 static_assert(sizeof(Fibre<3>) == 208 && alignof(Fibre<3>) == 16, "layout");
 static_assert(sizeof(NearField<3>) == 368 && alignof(NearField<3>) == 16, "layout");
 static_assert(sizeof(FarField<3>) <= 2048 && alignof(FarField<3>) == 16, "layout");
-static_assert(sizeof(Sample<3>) == 64 && sizeof(Evaluation<3>) == 16 && sizeof(RandomNumbers) == 20, "layout");
+static_assert(sizeof(Sample<3>) == 56 && sizeof(Evaluation<3>) == 16 && sizeof(RandomNumbers) == 20, "layout");
 
 /// A path vertex: the fibre of a textured material, a direction, and one light.
 __global__ void vertex(const Tables* tables, const FurParameters<3>* parameters, const Vector* known, const float* h,

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "medulla/fur_parameters.hpp"
 #include "render/error.hpp"
 #include "render/image_file.hpp"
 #include "render/render.hpp"
@@ -65,11 +66,21 @@ bool ends_with(const std::string& text, const std::string& end) {
     return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
+std::uint32_t mask_of(const std::vector<std::string>& names) {
+    std::uint32_t mask = 0;
+    for (const std::string& name : names)
+        for (int k = 0; k < medulla::all_lobe_count; ++k)
+            if (name == medulla::lobe_names[k]) mask |= 1u << k;
+    return mask;
+}
+
 struct Options {
-    std::string scene, out, field = "near", tone;
+    std::string scene, field = "near", tone;
+    std::vector<std::string> out;
+    std::vector<std::string> lobes;
     RenderOptions render;
     int samples = 0, width = 0, height = 0;
-    double exposure = 0;
+    double exposure = 0, density = 1;
     bool json = false, no_light_sampling = false;
     ProgressMode progress = ProgressMode::automatic;
 };
@@ -80,17 +91,21 @@ void run(const Options& o, const CLI::App& app) {
     if (o.height > 0) scene.picture.height = o.height;
     if (app.count("--exposure") > 0) scene.picture.exposure = float(o.exposure);
     if (!o.tone.empty()) scene.picture.filmic = o.tone == "filmic";
+    for (Object& object : scene.objects)
+        for (Layer& layer : object.coat) layer.density *= float(o.density);
 
     RenderOptions options = o.render;
     options.path.field = o.field == "near"  ? FieldChoice::one_offset
                          : o.field == "far" ? FieldChoice::whole_width
                                             : FieldChoice::multiscale;
     options.path.sample_lights = !o.no_light_sampling;
+    if (!o.lobes.empty()) options.path.lobes = mask_of(o.lobes);
     const bool open_ended = options.seconds > 0 || options.error > 0;
     options.samples = o.samples > 0 ? std::uint32_t(o.samples) : open_ended ? 1u << 20 : 64;
-    options.unfinished = o.out + ".unfinished";
-    options.key = fmt::format("{}\n{} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width, scene.picture.height,
-                              o.field, options.seed * 2 + std::uint32_t(options.path.sample_lights), scene.text);
+    options.unfinished = o.out.front() + ".unfinished";
+    options.key = fmt::format("{}\n{} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
+                              scene.picture.height, o.field, options.path.lobes, o.density, options.path.clamp,
+                              options.seed * 2 + std::uint32_t(options.path.sample_lights), scene.text);
 
     const auto start = std::chrono::steady_clock::now();
     const PathTracer tracer(scene, options.path);
@@ -103,10 +118,12 @@ void run(const Options& o, const CLI::App& app) {
         report = render(tracer, options, film, [&](double share) { progress(share); });
     }
     const double processor = std::max(1e-9, processor_seconds() - processor_before);
-    if (ends_with(o.out, ".png"))
-        write_png(film, scene.picture, o.out);
-    else
-        write_exr(film, o.out);
+    for (const std::string& out : o.out) {
+        if (ends_with(out, ".png"))
+            write_png(film, scene.picture, out);
+        else
+            write_exr(film, out);
+    }
     std::remove(options.unfinished.c_str());
 
     const Counts& n = report.counts;
@@ -133,8 +150,8 @@ void run(const Options& o, const CLI::App& app) {
         fmt::print("{}\n", json.dump());
         return;
     }
-    fmt::print("{}: {} samples per pixel, {:.1f} s, mean {:.4f} {:.4f} {:.4f}, error {:.2g}\n", o.out, film.samples,
-               report.seconds, mean[0], mean[1], mean[2], film.error());
+    fmt::print("{}: {} samples per pixel, {:.1f} s, mean {:.4f} {:.4f} {:.4f}, error {:.2g}\n", fmt::join(o.out, ", "),
+               film.samples, report.seconds, mean[0], mean[1], mean[2], film.error());
     if (film.nonfinite > 0) fmt::print("{} samples were not finite and count as black\n", film.nonfinite);
     if (!options.stats) return;
     fmt::print("{} strands, {:.0f} MB in Embree ({:.0f} bytes a strand), built in {:.1f} s\n", strands,
@@ -153,7 +170,9 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", "medulla " MEDULLA_VERSION);
     Options o;
     app.add_option("scene", o.scene, "scene file (JSON)")->required();
-    app.add_option("-o", o.out, "picture: .png (tone curve, sRGB) or .exr (linear radiance)")->required();
+    app.add_option("-o", o.out, "picture: .png (tone curve, sRGB) or .exr (linear radiance); may be given twice")
+        ->required()
+        ->allow_extra_args(false);
     app.add_option("--spp", o.samples, "samples per pixel (64; no limit with --time or --error)")
         ->check(CLI::Range(1, 1 << 24));
     app.add_option("--time", o.render.seconds, "stop after so many seconds")->check(CLI::Range(0.001, 1e9));
@@ -163,11 +182,20 @@ int main(int argc, char** argv) {
                    "near: one offset; far: the fibre's whole width; multiscale: what the pixel covers")
         ->check(CLI::IsMember({"near", "far", "multiscale"}))
         ->capture_default_str();
+    app.add_option("--lobes", o.lobes, "by which fibres scatter, of R,TT,TRT,TTs,TRTs,residual; all")
+        ->delimiter(',')
+        ->check(
+            CLI::IsMember(std::vector<std::string>(std::begin(medulla::lobe_names), std::end(medulla::lobe_names))));
     app.add_option("--width", o.width, "pixels, in place of the scene's")->check(CLI::Range(1, 16384));
     app.add_option("--height", o.height, "pixels, in place of the scene's")->check(CLI::Range(1, 16384));
     app.add_option("--exposure", o.exposure, "stops, in place of the scene's")->check(CLI::Range(-30, 30));
     app.add_option("--tone", o.tone, "the PNG's curve, in place of the scene's")
         ->check(CLI::IsMember({"filmic", "srgb"}));
+    app.add_option("--clamp", o.render.path.clamp,
+                   "most that one vertex after the first may add: fewer fireflies, biased; 0: off")
+        ->check(CLI::Range(0.0, 1e9));
+    app.add_option("--density", o.density, "times the coats' densities: below 1 for drafts")
+        ->check(CLI::Range(1e-6, 1e3));
     app.add_option("--threads", o.render.threads, "0: all processors")->check(CLI::Range(0, 1024));
     app.add_option("--seed", o.render.seed, "another seed, other noise");
     app.add_flag("--resume", o.render.resume, "go on from OUT.unfinished, which a killed run leaves");
@@ -186,8 +214,9 @@ int main(int argc, char** argv) {
         }
     try {
         app.parse(argc, argv);
-        if (!ends_with(o.out, ".png") && !ends_with(o.out, ".exr"))
-            throw CLI::ValidationError("-o", "expected a name that ends in .png or .exr, found " + o.out);
+        for (const std::string& out : o.out)
+            if (!ends_with(out, ".png") && !ends_with(out, ".exr"))
+                throw CLI::ValidationError("-o", "expected a name that ends in .png or .exr, found " + out);
     } catch (const CLI::Success& e) {
         return app.exit(e);
     } catch (const CLI::ParseError& e) {

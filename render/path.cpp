@@ -44,12 +44,27 @@ Pair on_disc(Pair u) {
     return {r * std::cos(angle), r * std::sin(angle)};
 }
 
+/// What a surface does with light from one direction; a direction that it draws.
+struct Towards {
+    Rgb value;      ///< times the light's radiance it is radiance along the path, per steradian
+    float pdf = 0;  ///< of drawing that direction, per steradian
+};
+struct Next {
+    Vec3 direction;
+    Rgb weight;
+    float pdf = 0;  ///< 0: the path ends
+};
+
 float tent(float u) { return u < 0.5f ? std::sqrt(2 * u) - 1 : 1 - std::sqrt(2 - 2 * u); }
 
 }  // namespace
 
 PathTracer::PathTracer(const Scene& scene, const PathOptions& options)
-    : scene_(scene), options_(options), geometry_(scene), lights_(scene.lights), shading_(new Shading(scene)) {
+    : scene_(scene),
+      options_(options),
+      geometry_(scene),
+      lights_(scene.lights),
+      shading_(new Shading(scene, geometry_.layers(), options.lobes)) {
     const Camera& c = scene.camera;
     const float half = std::tan(0.5f * c.fov);
     forward_ = normalise(c.to - c.from);
@@ -94,6 +109,10 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts) const {
     Rgb sum, throughput{1, 1, 1};
     float pdf = 0;  // of the direction that was drawn; 0: the camera's, which no light sample competes with
     float width = 0, spread = pixel_angle_;
+    const auto add = [&](Rgb light, bool direct) {
+        const float y = luminance(light);
+        sum += !direct && options_.clamp > 0 && y > options_.clamp ? (options_.clamp / y) * light : light;
+    };
     for (int vertex = 0; vertex < most_vertices; ++vertex) {
         Hit hit;
         {
@@ -104,7 +123,7 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts) const {
         const float reach = hit ? hit.distance : std::numeric_limits<float>::infinity();
         lights_.met(ray.origin, ray.direction, reach, [&](Rgb radiance, float light_pdf) {
             const bool alone = pdf == 0 || !options_.sample_lights;
-            sum += (alone ? 1.0f : share_of(pdf, light_pdf)) * (throughput * radiance);
+            add((alone ? 1.0f : share_of(pdf, light_pdf)) * (throughput * radiance), vertex <= 1);
         });
         if (!hit) break;
         ++counts.vertices;
@@ -114,8 +133,8 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts) const {
         LightSample light;
         if (options_.sample_lights) light = lights_.sample(position, pick.x, place);
         Start start;
-        FibreEvaluation towards;
-        FibreSample next;
+        Towards towards;
+        Next next;
         if (geometry_.is_strand(hit)) {
             const Stopwatch<Timed> watch(counts.shading);
             const StrandHit strand = geometry_.strand_hit(hit);
@@ -123,16 +142,20 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts) const {
             start = strand.start;
             width += hit.distance * spread;
             FibreHit fibre;
-            fibre.tangent = strand.tangent, fibre.known = -ray.direction;
+            fibre.layer = hit.geometry, fibre.tangent = strand.tangent, fibre.known = -ray.direction;
             fibre.point = (1 / strand.radius) * (position - strand.axis);
             fibre.footprint = width / strand.radius;
             fibre.along = strand.along;
             fibre.colour = layer.colour_of(strand.strand);
             const Pair a = random.pair(), b = random.pair();
             const float c = options_.field == FieldChoice::one_offset ? 0 : random.number();
-            shading_->at(layer.along, fibre, options_.field, [&](const auto& field) {
-                if (light.pdf > 0) towards = field.evaluate(light.direction);
-                next = field.sample(a, b, c);
+            shading_->at(fibre, options_.field, [&](const auto& field) {
+                if (light.pdf > 0) {
+                    const Evaluation<3> e = field.evaluate(light.direction);
+                    towards = {rgb(e.value), e.pdf};
+                }
+                const Sample<3> drawn = field.sample({a.x, a.y, b.x, b.y, c});
+                if (drawn.valid) next = {field.world(drawn.direction), rgb(drawn.weight), drawn.pdf};
             });
             spread = std::max(spread, spread_of_fibre);
         } else {
@@ -162,7 +185,8 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts) const {
             }
             ++counts.rays;
             if (!blocked)
-                sum += (share_of(light.pdf, towards.pdf) / light.pdf) * (throughput * towards.value * light.radiance);
+                add((share_of(light.pdf, towards.pdf) / light.pdf) * (throughput * towards.value * light.radiance),
+                    vertex == 0);
         }
         if (!(next.pdf > 0)) break;
         throughput *= next.weight;

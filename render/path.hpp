@@ -27,6 +27,8 @@ struct Counts {
 
 struct PathOptions {
     FieldChoice field = FieldChoice::one_offset;
+    std::uint32_t lobes = 63;   ///< by which fibres scatter: a LobeMask, all of them
+    float clamp = 0;            ///< most that one vertex after the first may add [luminance]; 0: no limit, no bias
     bool sample_lights = true;  ///< next-event estimation; without it lights are only met
 };
 

@@ -1,117 +1,143 @@
-// All that the renderer takes from medulla: the fibre at a hit, its value and pdf towards a light, a direction drawn.
+// All that the renderer takes from medulla: dense tables for each coat, the fibre at a hit, and its field, which the
+// path tracer evaluates towards lights and samples.
 #pragma once
 
+#include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <vector>
 
 #include "medulla/medulla.hpp"
 #include "render/error.hpp"
+#include "render/groom.hpp"
 #include "render/path.hpp"
-#include "render/random.hpp"
 #include "render/scene.hpp"
 
 namespace medulla::render {
 
 /// What a ray found. Unit vectors in world space.
 struct FibreHit {
-    Vec3 tangent;     ///< from root to tip
-    Vec3 known;       ///< back along the ray
-    Vec3 point;       ///< from the axis to the hit [fibre radii]
-    float footprint;  ///< diameter of the ray's cone [fibre radii]
-    float along;      ///< [0, 1] from root to tip
-    float colour;     ///< factor of sigma_ca
+    std::size_t layer;  ///< whose strand it is
+    Vec3 tangent;       ///< from root to tip
+    Vec3 known;         ///< back along the ray
+    Vec3 point;         ///< from the axis to the hit [fibre radii]
+    float footprint;    ///< diameter of the path's cone [fibre radii]
+    float along;        ///< [0, 1] from root to tip
+    float colour;       ///< factor of sigma_ca
 };
 
-struct FibreEvaluation {
-    Rgb value;      ///< energy per steradian
-    float pdf = 0;  ///< per steradian
+/// A fibre's field with its frame in the world.
+template <class Field>
+struct FieldInWorld {
+    Basis basis;
+    Field field;
+
+    Evaluation<3> evaluate(Vec3 drawn) const { return field.evaluate(local(basis, drawn)); }
+    Sample<3> sample(RandomNumbers u) const { return field.sample(u); }
+    Vec3 world(Vector w) const { return basis.to_world({w.x, w.y, w.z}); }
+    static Vector local(const Basis& basis, Vec3 w) {
+        const Vec3 v = basis.to_local(w);
+        return {v.x, v.y, v.z};
+    }
 };
-struct FibreSample {
-    Vec3 direction;
-    Rgb weight;     ///< value / pdf
-    float pdf = 0;  ///< 0: nothing drawn
-};
+
+inline Rgb rgb(const Colour<3>& c) { return {c[0], c[1], c[2]}; }
 
 class Shading {
   public:
-    explicit Shading(const Scene& scene) {
-        const OpenResult opened = open_pack(default_pack_words, default_pack_size);
-        for (const Material& material : scene.materials) {
-            fibres_.push_back(std::make_unique<Prepared>());
-            const FurStatus status = prepare(material.fur, opened.pack, fibres_.back()->fibre);
-            if (status != FurStatus::ok) throw Error("material {}: {}", material.name, describe(status));
-            unfold(fibres_.back()->fibre, fibres_.back()->tables);
-        }
+    Shading(const Scene& scene, const std::vector<Strands>& layers, LobeMask lobes) : lobes_(lobes) {
+        const PackView pack = default_pack();
+        for (const Strands& layer : layers) coats_.push_back(make_coat(scene.materials, layer.along, pack));
     }
 
-    /// Calls use(field), which has evaluate(direction) and sample(pairs), for the fibre at a hit.
+    /// Calls use(field in world) for the fibre at a hit.
     template <class Use>
-    auto at(const std::vector<Stop>& along, const FibreHit& hit, FieldChoice choice, Use&& use) const {
-        const FurFibre<3>& fibre = fibres_[std::size_t(nearest(along, hit.along).material)]->fibre;
-        const Vec3 x = -hit.tangent;
-        const Basis basis = basis_about(x);
-        const auto local = [&](Vec3 w) {
-            const Vec3 v = basis.to_local(w);
-            return Vector<float>{v.x, v.y, v.z};
-        };
-        const Vector<float> known = local(hit.known);
-        const float offset = offset_of(known, local(hit.point)), h = std::min(1.0f, std::max(-1.0f, offset));
-        const Angles<float> angles = angles_of(known);
-        OffsetRange range{};
-        if (choice == FieldChoice::multiscale) range = pixel_coverage(h, hit.footprint, 1, 1);
-        const bool narrow = choice == FieldChoice::one_offset ||
-                            (choice == FieldChoice::multiscale && hit.footprint < narrow_footprint);
-        if (narrow) {
-            Field<NearField<3>, NearSampler<3>> field(basis, angles);
-            near_field(fibre, angles.theta, h, field.field);
-            field.sampler.prepare(field.field);
-            return use(field);
-        }
-        Field<FarField<3>, FarSampler<3>> field(basis, angles);
-        far_field(fibre, angles.theta, range, field.field);
-        field.sampler.prepare(field.field);
-        return use(field);
+    void at(const FibreHit& hit, FieldChoice choice, Use&& use) const {
+        const Basis basis = basis_about(hit.tangent);
+        const Vector known = FieldInWorld<int>::local(basis, hit.known);
+        const float h = offset_of(known, FieldInWorld<int>::local(basis, hit.point));
+        const Coat& coat = coats_[hit.layer];
+        const Fibre<3> fibre = coat.stops.size() == 1 && hit.colour == 1 ? coat.first : fibre_at(coat, hit);
+        const bool one_offset = choice == FieldChoice::one_offset ||
+                                (choice == FieldChoice::multiscale && hit.footprint < narrow_footprint);
+        if (one_offset) return with_lobes(basis, near_field(fibre, known, h), use);
+        const Offsets offsets = choice == FieldChoice::multiscale ? pixel_coverage(h, hit.footprint, 1, 1) : Offsets{};
+        with_lobes(basis, far_field(fibre, known, offsets), use);
     }
 
   private:
-    /// A pixel narrower than this share of the radius sees one offset.
+    /// A cone narrower than this share of the radius sees one offset.
     static constexpr float narrow_footprint = 0.05f;
 
-    struct Prepared {
-        FurFibre<3> fibre;
-        UnfoldedTables tables;
+    struct Free {
+        void operator()(void* memory) const { std::free(memory); }
+    };
+    struct ParametersAt {
+        float at;
+        FurParameters<3> fur;
+    };
+    struct Coat {
+        std::vector<ParametersAt> stops;
+        std::unique_ptr<void, Free> memory;
+        const Tables* tables = nullptr;
+        Fibre<3> first;
     };
 
-    template <class F, class Sampler>
-    struct Field {
-        Basis basis;
-        Angles<float> known;
-        F field;
-        Sampler sampler;
-
-        Field(const Basis& b, Angles<float> k) : basis(b), known(k) {}
-        FibreEvaluation evaluate(Vec3 w) const {
-            const Vec3 v = basis.to_local(w);
-            const Angles<float> drawn = angles_of(Vector<float>{v.x, v.y, v.z});
-            const Colour<3> c = density(field, drawn.theta, drawn.phi - known.phi);
-            return {{c.value[0], c.value[1], c.value[2]}, sampler.pdf(drawn.theta, drawn.phi - known.phi)};
-        }
-        FibreSample sample(Pair a, Pair b, float c) const {
-            const FurSample<3> s = sampler.sample({a.x, a.y, b.x, b.y, c});
-            if (!s.valid) return {};
-            const Vector<float> v = direction_of(Angles<float>{s.theta_r, s.phi + known.phi});
-            return {basis.to_world({v.x, v.y, v.z}), {s.weight[0], s.weight[1], s.weight[2]}, s.pdf};
-        }
-    };
-
-    static Stop nearest(const std::vector<Stop>& along, float at) {
-        Stop best = along.front();
-        for (const Stop& stop : along)
-            if (std::abs(stop.at - at) < std::abs(best.at - at)) best = stop;
-        return best;
+    template <class Field, class Use>
+    void with_lobes(const Basis& basis, const Field& field, Use&& use) const {
+        use(FieldInWorld<Field>{basis, lobes_ == all_lobes ? field : field.keep(lobes_)});
     }
 
-    std::vector<std::unique_ptr<Prepared>> fibres_;
+    /// Tables over all that materials between the stops can ask for: the ends of each parameter's range.
+    static Coat make_coat(const std::vector<Material>& materials, const std::vector<Stop>& along,
+                          const PackView& pack) {
+        Coat coat;
+        for (const Stop& stop : along) coat.stops.push_back({stop.at, materials[std::size_t(stop.material)].fur});
+        FurParameters<3> low = coat.stops[0].fur, high = low;
+        for (const ParametersAt& stop : coat.stops) {
+            const FurParameters<3>& p = stop.fur;
+            low.sigma_ms = std::min(low.sigma_ms, p.sigma_ms), high.sigma_ms = std::max(high.sigma_ms, p.sigma_ms);
+            low.kappa = std::min(low.kappa, p.kappa), high.kappa = std::max(high.kappa, p.kappa);
+            low.g = std::min(low.g, p.g), high.g = std::max(high.g, p.g);
+            high.eta = std::min(high.eta, p.eta);
+        }
+        const TableRanges ranges = join(ranges_of(low), ranges_of(high));
+        const std::size_t bytes = (tables_bytes(pack, ranges) + 63) / 64 * 64;
+        coat.memory.reset(std::aligned_alloc(64, std::max<std::size_t>(64, bytes)));
+        const TablesResult made = make_tables(pack, ranges, coat.memory.get(), bytes);
+        if (made.status != TablesStatus::ok)
+            throw Error("material {}: {}", materials[std::size_t(along[0].material)].name, describe(made.status));
+        coat.tables = made.tables;
+        for (const Stop& stop : along) {
+            const Material& material = materials[std::size_t(stop.material)];
+            const Fibre<3> fibre = make_fibre(material.fur, coat.tables);
+            if (fibre.status != FibreStatus::ok) throw Error("material {}: {}", material.name, describe(fibre.status));
+        }
+        coat.first = make_fibre(coat.stops[0].fur, coat.tables);
+        return coat;
+    }
+
+    /// All parameters interpolated between the two stops about the hit.
+    static Fibre<3> fibre_at(const Coat& coat, const FibreHit& hit) {
+        std::size_t next = 0;
+        while (next < coat.stops.size() && coat.stops[next].at <= hit.along) ++next;
+        FurParameters<3> p = coat.stops[next == 0 ? 0 : next - 1].fur;
+        if (next > 0 && next < coat.stops.size()) {
+            const FurParameters<3>& q = coat.stops[next].fur;
+            const float from = coat.stops[next - 1].at, t = (hit.along - from) / (coat.stops[next].at - from);
+            for (float FurParameters<3>::*x :
+                 {&FurParameters<3>::eta, &FurParameters<3>::kappa, &FurParameters<3>::alpha, &FurParameters<3>::beta_m,
+                  &FurParameters<3>::beta_n, &FurParameters<3>::layers, &FurParameters<3>::sigma_ms,
+                  &FurParameters<3>::sigma_ma, &FurParameters<3>::g})
+                p.*x = mix(p.*x, q.*x, t);
+            for (int c = 0; c < 3; ++c) p.sigma_ca[c] = mix(p.sigma_ca[c], q.sigma_ca[c], t);
+        }
+        for (float& sigma : p.sigma_ca) sigma *= hit.colour;
+        return make_fibre(p, coat.tables, OutOfRange::clamp);
+    }
+
+    LobeMask lobes_;
+    std::vector<Coat> coats_;
 };
 
 }  // namespace medulla::render

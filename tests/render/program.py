@@ -7,7 +7,6 @@ import subprocess
 import sys
 import tempfile
 import unittest
-import zlib
 
 SCENES = os.path.abspath(sys.argv.pop())
 BIN = os.path.abspath(sys.argv.pop())
@@ -23,11 +22,16 @@ def run(*options, cwd):
     return done.returncode, done.stdout, done.stderr
 
 
-def rows_of_png(path):
-    data = open(path, "rb").read()
+def bytes_of(path):
+    with open(path, "rb") as file:
+        return file.read()
+
+
+def form_of_png(path):
+    """Width, height, bits, colour type."""
+    data = bytes_of(path)
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    width, height, depth, colour = struct.unpack(">IIBB", data[16:26])
-    return width, height, depth, colour
+    return struct.unpack(">IIBB", data[16:26])
 
 
 class FurRender(unittest.TestCase):
@@ -58,10 +62,11 @@ class FurRender(unittest.TestCase):
         self.assertRegex(run("--version", cwd=self.cwd)[1], r"medulla \d+\.\d+\.\d+")
         for words in ([], ["patch.json"], ["patch.json", "-o", "x.jpg"], ["patch.json", "-o", "x.png", "--spp", 0],
                       ["patch.json", "-o", "x.png", "--field", "middle"], ["patch.json", "-o", "x.png", "--error", "-1"],
+                      ["patch.json", "-o", "x.png", "--lobes", "R,TTT"], ["patch.json", "-o", "x.png", "-o", "y.gif"],
                       ["patch.json", "-o", "x.png", ""], ["patch.json", "-o", "x.png", "--nonsense"]):
             self.fails(2, *words)
         self.fails(1, "absent.json", "-o", "x.png", names=["absent.json", "No such file"])
-        self.fails(1, ".", "-o", "x.png", names=[". "[:1]])
+        self.fails(1, ".", "-o", "x.png", names=[".: "])
         self.fails(1, "patch.json", "-o", "nowhere/x.png", "--spp", 1, *SMALL, names=["nowhere/x.png"])
         self.fails(1, "patch.json", "-o", "nowhere/x.exr", "--spp", 1, *SMALL, names=["nowhere/x.exr"])
         bad = json.loads(json.dumps(PATCH))
@@ -74,7 +79,7 @@ class FurRender(unittest.TestCase):
         code, out, err = run("patch.json", "-o", "x.png", "--spp", 4, "--json", "--stats", *SMALL, cwd=self.cwd)
         self.assertEqual((code, err), (0, ""))
         report = json.loads(out)
-        self.assertEqual(rows_of_png(self.path("x.png")), (24, 24, 8, 2))
+        self.assertEqual(form_of_png(self.path("x.png")), (24, 24, 8, 2))
         self.assertEqual((report["nonfinite"], report["samples"], len(report["mean"])), (0, 4, 3))
         self.assertTrue(all(0 < c < 1 for c in report["mean"]), report)
         self.assertGreater(report["vertices_per_second"], 0)
@@ -86,22 +91,36 @@ class FurRender(unittest.TestCase):
         pictures = set()
         for threads in (1, 2):
             self.assertEqual(run("patch.json", "-o", "x.png", "--spp", 9, "--threads", threads, *SMALL, cwd=self.cwd)[0], 0)
-            pictures.add(open(self.path("x.png"), "rb").read())
+            pictures.add(bytes_of(self.path("x.png")))
         self.assertEqual(len(pictures), 1)
         self.assertEqual(run("patch.json", "-o", "x.png", "--spp", 9, "--seed", 1, *SMALL, cwd=self.cwd)[0], 0)
-        self.assertNotIn(open(self.path("x.png"), "rb").read(), pictures)
+        self.assertNotIn(bytes_of(self.path("x.png")), pictures)
+
+    def test_lobes(self):
+        """Each lobe alone is dimmer than all of them; the skin, which has none, shows in every picture."""
+        means = {}
+        for lobes in ("R", "TT", "TRT", "TTs", "TRTs", "residual", "R,TT,TRT,TTs,TRTs,residual", None):
+            words = ["--lobes", lobes] if lobes else []
+            code, out, err = run("patch.json", "-o", "x.png", "--spp", 16, "--json", *words, *SMALL, cwd=self.cwd)
+            self.assertEqual((code, err), (0, ""))
+            means[lobes] = json.loads(out)["mean"][1]
+        everything = means.pop(None)
+        self.assertEqual(everything, means.pop("R,TT,TRT,TTs,TRTs,residual"))
+        for lobe, mean in means.items():
+            self.assertTrue(0 < mean < everything, (lobe, means, everything))
+        self.assertEqual(len(set(means.values())), 6)
 
     def test_time(self):
-        code, out, err = run("patch.json", "-o", "x.exr", "--time", 0.2, "--json", *SMALL, cwd=self.cwd)
+        code, out, err = run("patch.json", "-o", "y.png", "-o", "x.exr", "--time", 0.2, "--json", *SMALL, cwd=self.cwd)
         self.assertEqual((code, err), (0, ""))
         self.assertGreaterEqual(json.loads(out)["seconds"], 0.2)
-        self.assertEqual(open(self.path("x.exr"), "rb").read(4), b"\x76\x2f\x31\x01")
+        self.assertEqual(bytes_of(self.path("x.exr"))[:4], b"\x76\x2f\x31\x01")
 
     def test_scenes_that_ship(self):
-        """Every scene is one the program takes; the furnace's mean is 1 to 5 standard errors of its picture's mean."""
+        """Each is one that the program takes; the furnace's mean is 1 to 5 standard errors of the picture's mean."""
         for name in sorted(os.listdir(SCENES)):
             code, out, err = run(os.path.join(SCENES, name), "-o", "x.png", "--spp", 16 if name == "furnace.json" else 1,
-                                 "--json", *SMALL, cwd=self.cwd)
+                                 "--json", "--density", 1 if name == "furnace.json" else 0.02, *SMALL, cwd=self.cwd)
             self.assertEqual((code, err), (0, ""), name)
             report = json.loads(out)
             self.assertEqual(report["nonfinite"], 0, name)

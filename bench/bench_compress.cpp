@@ -1,8 +1,8 @@
 // Ways to compress the same table, in one process and one thread: processor seconds, bytes, error and nanoseconds of
 // packs at ranks 4 to 96 and of the packs that bytes choose, of non-negative ones, of Tucker and of a truncated SVD in
 // the same number of bytes, and of full-tensor CP-ALS. Usage: bench_compress TABLES.h5... [--full] [--json FILE]
-// [--svg FILE]; --full adds what takes minutes: packs that bytes choose, rank 16 of the disc's bins as they are, by our
-// solver and by full-tensor ALS.
+// [--figure FILE] [--from JSON]; --full adds runs of minutes: packs that bytes choose, rank 16 of the disc's bins as
+// they are, by our solver and by full-tensor ALS.
 #include <fmt/core.h>
 #include <omp.h>
 
@@ -13,9 +13,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "error_figure.hpp"
 #include "medulla/lookup.hpp"
 #include "tables/pack/compress.hpp"
-#include "tables/programs/plot.hpp"
 #include "tables/store/tables_file.hpp"
 #include "tensor/hosvd.hpp"
 
@@ -60,13 +60,13 @@ tensor::Tensor tensor_of(const Table& table, TableKind kind) {
     return tensor;
 }
 
-/// Error of a model, its bytes, and the seconds of finding it.
+/// Error and bytes of a model, and the seconds of the solve.
 struct Found {
     double error = 1, bytes = 0, seconds = 0;
 };
 
-/// Least error of a Tucker model within `bytes`: the sequentially truncated HOSVD, whose bases are the best of their
-/// sizes but for a factor sqrt(order). The seconds are those of one HOSVD, not of the search for its truncation.
+/// Smallest error of a Tucker model within `bytes`: the sequentially truncated HOSVD, which is optimal up to a factor
+/// of sqrt(order). Seconds of one HOSVD, without the search for its truncation.
 Found tucker(const tensor::Tensor& table, double bytes) {
     Found best;
     double low = std::log(1e-4), high = 0;
@@ -103,11 +103,11 @@ std::vector<Found> svd(const tensor::Tensor& table, const std::vector<double>& b
     return list;
 }
 
-/// A contraction of all parameter axes and one exit direction, cold in everything but the caches.
+/// Nanoseconds of a contraction of all parameter axes and one exit direction, with warm caches.
 double lookup_nanoseconds(const std::vector<unsigned char>& pack, TableKind kind) {
     const PackView view = open_pack(pack.data(), pack.size()).pack;
     const TableView& table = view[kind];
-    constexpr int count = 500, repeats = 200;  // short stretches, the best of many: other jobs interrupt few of them
+    constexpr int count = 500, repeats = 200;  // the best of many short runs, few of which other jobs interrupt
     double best = INFINITY;
     volatile float sink = 0;
     for (int repeat = 0; repeat < repeats; ++repeat) {
@@ -124,7 +124,7 @@ double lookup_nanoseconds(const std::vector<unsigned char>& pack, TableKind kind
     return best;
 }
 
-/// Bytes of one kind in a pack: its rows, scales and integrals; knots and text belong to none.
+/// Bytes of one kind in a pack: rows, scales and integrals, without shared knots and text.
 double kind_bytes(const TableReport& report, const std::vector<unsigned char>& pack) {
     const OpenResult opened = open_pack(pack.data(), pack.size());
     const TableView& table = opened.pack[report.kind];
@@ -144,7 +144,7 @@ void add_pack(Bench& bench, const Tables& tables, const std::string& name, const
                            error.energy, result.cpu_seconds, lookup_nanoseconds(result.pack, report.kind)});
 }
 
-void write_json(const std::string& file, const Bench& bench) {
+nlohmann::ordered_json to_json(const Bench& bench) {
     nlohmann::ordered_json json = nlohmann::ordered_json::array();
     for (const Row& row : bench.rows) {
         nlohmann::ordered_json one = {
@@ -155,35 +155,46 @@ void write_json(const std::string& file, const Bench& bench) {
         if (!std::isnan(row.nanoseconds)) one["lookup_ns"] = row.nanoseconds;
         json.push_back(one);
     }
-    std::ofstream(file) << json.dump(1) << '\n';
+    return json;
 }
 
 /// Error against bytes, seconds and nanoseconds: a row of panels each, a column per kind, a curve per family.
-void write_svg(const std::string& file, const Bench& bench) {
-    const std::pair<const char*, const char*> families[] = {{"CP, rank", "#0072b2"},         {"CP, within", "#56b4e9"},
-                                                            {"CP, non-negative", "#009e73"}, {"Tucker", "#d55e00"},
-                                                            {"truncated SVD", "#cc79a7"},    {"full ALS", "#000000"}};
-    const std::pair<const char*, double Row::*> axes[] = {
-        {"bytes", &Row::bytes}, {"processor seconds of a solve", &Row::seconds}, {"ns per lookup", &Row::nanoseconds}};
-    std::vector<Panel> panels;
-    for (const auto& [label, x] : axes)
+plot::Figure figure_of(const nlohmann::ordered_json& rows) {
+    struct Family {
+        const char *method, *label, *colour;  ///< what the method's name begins with
+    };
+    const Family families[] = {{"CP, rank", "CP, by rank", plot::blue},
+                               {"CP, within", "CP, by size", plot::sky},
+                               {"CP, non-negative", "CP, non-negative", plot::green},
+                               {"Tucker", "Tucker", plot::orange},
+                               {"truncated SVD", "truncated SVD", plot::purple},
+                               {"full ALS", "full-tensor ALS", plot::black}};
+    const std::pair<const char*, const char*> costs[] = {{"bytes of this kind of lobe", "bytes"},
+                                                         {"processor seconds of a solve", "cpu_seconds"},
+                                                         {"nanoseconds of a lookup", "lookup_ns"}};
+    plot::Figure figure;
+    figure.title = "Ways to compress the same table";
+    for (const auto& [cost, key] : costs) {
+        std::vector<plot::Panel> panels;
         for (const TableKind kind : lobe_kinds) {
-            Panel panel;
+            plot::Panel panel;
             panel.title = name_of(kind);
-            panel.x_label = label;
-            panel.y_label = "relative L2 error";
-            panel.log_x = true;
-            for (const auto& [family, colour] : families) {
-                Curve curve;
-                curve.label = family, curve.colour = colour, curve.marks = true;
-                for (const Row& row : bench.rows)
-                    if (row.kind == kind && row.method.rfind(family, 0) == 0 && row.*x > 0)
-                        curve.x.push_back(row.*x), curve.y.push_back(row.error);
+            for (const auto& [method, label, colour] : families) {
+                plot::Curve curve;
+                curve.label = label, curve.colour = colour, curve.marks = true, curve.width = 2;
+                for (const auto& row : rows)
+                    if (row.at("lobes") == name_of(kind) && row.value(key, 0.0) > 0 &&
+                        row.at("method").get<std::string>().rfind(method, 0) == 0)
+                        curve.x.push_back(row.at(key)), curve.y.push_back(row.at("relative_l2"));
                 if (!curve.x.empty()) panel.curves.push_back(curve);
+                curve.x.clear(), curve.y.clear();
+                if (figure.legend.size() < std::size(families)) figure.legend.push_back(curve);
             }
-            if (!panel.curves.empty()) panels.push_back(panel);
+            if (!panel.curves.empty()) panels.push_back(std::move(panel));
         }
-    std::ofstream(file) << svg("Ways to compress the same table", panels, 3);
+        bench::add_panels(figure, 3, cost, 1e-6, std::move(panels));
+    }
+    return figure;
 }
 
 }  // namespace
@@ -191,13 +202,22 @@ void write_svg(const std::string& file, const Bench& bench) {
 int main(int argc, char** argv) {
     CLI::App app("Ways to compress the same table");
     std::vector<std::string> files;
-    std::string json_file, svg_file;
+    std::string json_file, figure_file, numbers_file;
     bool full = false;
-    app.add_option("FILE", files)->required()->expected(1, 2);
+    app.add_option("FILE", files)->expected(1, 2);
     app.add_flag("--full", full);
     app.add_option("--json", json_file);
-    app.add_option("--svg", svg_file);
+    app.add_option("--figure", figure_file, "draw the numbers into FILE: .svg, .png or .html");
+    app.add_option("--from", numbers_file, "measure nothing: draw the numbers that --json wrote into FILE");
     CLI11_PARSE(app, argc, argv);
+    if (!numbers_file.empty()) {
+        bench::save(figure_of(nlohmann::ordered_json::parse(std::ifstream(numbers_file))), figure_file);
+        return 0;
+    }
+    if (files.empty()) {
+        fmt::print(stderr, "bench_compress: expected a tables file\n");
+        return 2;
+    }
     omp_set_num_threads(1);
     Tables tables = read_tables(files[0]);
     if (files.size() > 1) {
@@ -207,7 +227,7 @@ int main(int argc, char** argv) {
     fmt::print("{:<26} {:<22} {:>9} {:>10} {:>10} {:>10} {:>9} {:>9}\n", "method", "lobes", "bytes", "rel. L2",
                "worst lobe", "energy", "cpu s", "ns");
     Bench bench;
-    // One table at a time, so that seconds are those of its solves.
+    // One table at a time, so that seconds belong to its solves.
     std::vector<Tables> single;
     if (tables.azimuthal) single.push_back({tables.azimuthal, {}, tables.program});
     if (tables.longitudinal) single.push_back({{}, tables.longitudinal, tables.program});
@@ -256,6 +276,7 @@ int main(int argc, char** argv) {
             whole(fmt::format("full ALS 16, seed {}", seed), tensor::cp_als, als);
         }
     }
-    if (!json_file.empty()) write_json(json_file, bench);
-    if (!svg_file.empty()) write_svg(svg_file, bench);
+    const nlohmann::ordered_json numbers = to_json(bench);
+    if (!json_file.empty()) std::ofstream(json_file) << numbers.dump(1) << '\n';
+    if (!figure_file.empty()) bench::save(figure_of(numbers), figure_file);
 }

@@ -1,4 +1,4 @@
-// CP solvers on the stand-in table: seconds, error, degeneracy of full ALS and of the compressed solvers, one process.
+// CP solvers on the table of stand_in.hpp: seconds, error and degeneracy of full ALS and the compressed solvers.
 // Usage: bench_cp [--full] [--json] [rank ...]; --full adds three 500-sweep runs of full-tensor ALS per rank.
 #include <omp.h>
 

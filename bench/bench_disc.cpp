@@ -1,5 +1,5 @@
 // Seconds and true error of the disc solver, slice by slice, per target error (whole tables: bench_simulation
-// --tables). The true error is the relative L2 distance from the same solver on a grid far finer (--reference).
+// --tables). The true error is the relative L2 distance to the same solver on a much finer grid (--reference).
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ using namespace medulla;
 
 namespace {
 
-/// Processor time: the machine's other work costs less of it than of the wall's.
+/// Processor time, which other work on the machine disturbs less than wall time.
 double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 double distance(const std::vector<double>& a, const std::vector<double>& b) {
@@ -50,7 +50,7 @@ int main(int argc, char** argv) {
     app.add_option("--json", json, "write the numbers to FILE");
     CLI11_PARSE(app, argc, argv);
 
-    // The default offsets, those of 24 nodes, and a few that no table asks for.
+    // The default offsets, those of 24 nodes, and a few that are on no table.
     std::vector<double> h = tables::graded_axis("h", {0, 1, 16}).values;
     for (const double x : tables::graded_axis("h", {0, 1, 24}).values)
         if (x > 0.9 && x < 1) h.push_back(x);

@@ -1,4 +1,4 @@
-// One call per solver for a cell or slice of either table: what the benchmarks of the simulator share.
+// Shared by the benchmarks of the simulator: one call per solver for a cell or slice of either table.
 #pragma once
 
 #include <algorithm>
@@ -55,7 +55,7 @@ inline double distance(const Lobes& a, const Lobes& b) {
     return worst;
 }
 
-/// How fine a deterministic solution is: the disc's target error, the slab's directions over what it would choose.
+/// Resolution of a deterministic solution: the disc's target error, and the slab's directions relative to its default.
 struct Resolution {
     double disc_target, slab_scale;
 };
@@ -70,7 +70,8 @@ inline sim2d::SlabOptions slab_options(double g, double scale, bool estimate) {
     return o;
 }
 
-/// The deterministic solver of one g; threads may share it. The slab has a resolution of its own, whatever the target.
+/// The deterministic solver of one g; threads may share it. The slab chooses its own resolution, independent of the
+/// target.
 class SliceSolver {
   public:
     SliceSolver(bool disc, double g, double target, bool estimate) {

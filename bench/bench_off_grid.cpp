@@ -1,7 +1,7 @@
 // Errors of whole lobes at random parameters off every grid, everything included: the solver, the axes, interpolation,
 // compression, rounding. Usage: bench_off_grid [--pairs N] [--lobes M] [--seed S] [--json FILE] SOURCE...
 // SOURCE is a tables file, a pack or `default`. N random (sigma, g), M random offsets and inclinations at each; every
-// parameter is even between the nodes of the default axes, so that each of their cells is as likely as another.
+// parameter is uniform between two nodes of the default axes, and all intervals are equally likely.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -25,7 +25,7 @@ struct Lobe {
     std::vector<double> truth;
 };
 
-/// Even between the nodes of an axis.
+/// Uniform between the nodes of an axis.
 double between(const Axis& axis, std::mt19937_64& random) {
     const double u = std::uniform_real_distribution<double>(0, static_cast<double>(axis.size() - 1))(random);
     const auto i = std::min(static_cast<std::size_t>(u), axis.size() - 2);

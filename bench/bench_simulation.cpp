@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "bench_lobes.hpp"
-#include "plot_log.hpp"
+#include "error_figure.hpp"
 #include "sim2d/random.hpp"
 #include "sim2d/tracer/kernel.hpp"
 #include "tables/job/request.hpp"
@@ -30,9 +30,14 @@ using nlohmann::json;
 namespace {
 
 enum Method { kAnalog, kRandom, kDeterministic, kMethods };
-const std::vector<bench::Series> kSeries = {{"analog", "#888888"}, {"random", "#1f77b4"}, {"deterministic", "#d62728"}};
+const char* const kNames[] = {"analog", "random", "deterministic"};
 
-/// Processor time of all threads: the machine's other work costs less of it than of the wall's.
+struct Point {
+    double seconds, error;
+};
+using Points = std::vector<Point>[kMethods];
+
+/// Processor time of all threads, which other work on the machine disturbs less than wall time.
 double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 double wall() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
@@ -41,10 +46,10 @@ double median(std::vector<double> v) {
     return v[v.size() / 2];
 }
 
-json to_json(const std::vector<std::vector<bench::Point>>& points) {
+json to_json(const Points& points) {
     json out;
-    for (std::size_t m = 0; m < points.size(); ++m)
-        for (const bench::Point& p : points[m]) out[kSeries[m].name].push_back({p.seconds, p.error});
+    for (std::size_t m = 0; m < kMethods; ++m)
+        for (const Point& p : points[m]) out[kNames[m]].push_back({p.seconds, p.error});
     return out;
 }
 
@@ -55,15 +60,15 @@ const TableCell kCells[] = {{true, 0.3, 0.0, 0.3},  {true, 0.3, 0.8, 0.3},  {tru
                             {false, 0.3, 0.0, 0.5}, {false, 0.3, 0.8, 0.5}, {false, 2, 0.0, 1.2},
                             {false, 2, 0.8, 1.2},   {false, 12, 0.0, 0.5},  {false, 12, 0.9, 0.5}};
 
-/// One thread, in turn in one process; truth is a deterministic solution on a finer grid.
-bench::Panel measure(const TableCell& c) {
-    bench::Panel panel{title(c), {-4, 2}, std::vector<std::vector<bench::Point>>(kMethods)};
+/// On one thread, one after the other in one process; the reference is a deterministic solution on a finer grid.
+json measure(const TableCell& c) {
+    Points points;
     const Lobes truth = solve_deterministic(c, bench::kFinest);
     const auto add = [&](Method method, auto&& run) {
         const double start = now();
         const Lobes found = run();
         const double seconds = now() - start;
-        panel.points[method].push_back({seconds, bench::distance(found, truth)});
+        points[method].push_back({seconds, bench::distance(found, truth)});
     };
     for (const std::uint64_t paths : {512, 4096, 32768, 262144}) {
         add(kAnalog, [&] { return trace_analog(c, 4 * paths).lobes; });
@@ -71,14 +76,14 @@ bench::Panel measure(const TableCell& c) {
     }
     for (const bench::Resolution& r : bench::kResolutions)
         add(kDeterministic, [&] { return solve_deterministic(c, r); });
-    std::printf("%s\n", panel.title.c_str());
+    std::printf("%s\n", title(c).c_str());
     for (std::size_t m = 0; m < kMethods; ++m) {
-        std::printf("  %-14s", kSeries[m].name);
-        for (const bench::Point& p : panel.points[m]) std::printf("  %9.5f s %.2e", p.seconds, p.error);
+        std::printf("  %-14s", kNames[m]);
+        for (const Point& p : points[m]) std::printf("  %9.5f s %.2e", p.seconds, p.error);
         std::printf("\n");
     }
     std::fflush(stdout);
-    return panel;
+    return {{"cell", title(c)}, {"seconds_error", to_json(points)}};
 }
 
 // Tables --------------------------------------------------------------------------------------------------------------
@@ -87,7 +92,7 @@ struct Errors {
     std::vector<double> estimated, actual, energy;
 };
 
-/// One table by the deterministic solver on all threads, against a finer grid where there is one.
+/// One table by the deterministic solver on all threads, and its error against a finer grid if requested.
 void solve_table(bool disc, double target, double reference, Errors& e) {
     const tables::Request axes = tables::default_request();
     const std::size_t slices = axes.sigma.size() * axes.g.size();
@@ -100,7 +105,7 @@ void solve_table(bool disc, double target, double reference, Errors& e) {
     }
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t s = 0; s < slices; ++s) {
-        // The costly end first: great sigma.
+        // The expensive end first: large sigma.
         const std::size_t slice = slices - 1 - s;
         const double sigma = axes.sigma.values[slice / axes.g.size()];
         const std::size_t ig = slice % axes.g.size();
@@ -116,14 +121,12 @@ void solve_table(bool disc, double target, double reference, Errors& e) {
     }
 }
 
-/// Seconds of both tables. The random methods: what cells drawn at random took, times the number of cells; analog from
-/// 20000 paths by 1 / error^2.
-bench::Panel measure_tables(double reference, std::size_t cells, json& out) {
-    bench::Panel panel{
-        "both default tables, processor seconds", {-1, 7}, std::vector<std::vector<bench::Point>>(kMethods)};
+/// Seconds of both tables. Random methods: mean time of random cells times the number of cells; analog extrapolated
+/// from 20000 paths by 1 / error^2.
+json measure_tables(double reference, std::size_t cells) {
+    json out;
     const auto report = [&](Method method, double target, double seconds, json more) {
-        panel.points[method].push_back({seconds, target});
-        more.update({{"method", kSeries[method].name}, {"error", target}, {"processor_s", seconds}});
+        more.update({{"method", kNames[method]}, {"error", target}, {"processor_s", seconds}});
         out.push_back(more);
         std::fflush(stdout);
     };
@@ -139,7 +142,7 @@ bench::Panel measure_tables(double reference, std::size_t cells, json& out) {
         const double worst_slab = *std::max_element(slab.estimated.begin(), slab.estimated.end());
         std::printf(
             "both tables, deterministic, target %.0e: %.1f s on %d threads (disc %.1f), %.1f processor seconds\n"
-            "  worst estimated error: disc %.1e, slab %.1e; disc's energy before scaling misses %.1e at most\n",
+            "  worst estimated error: disc %.1e, slab %.1e; error of the disc's energy before scaling %.1e at most\n",
             target, both_wall, omp_get_max_threads(), disc_wall, seconds, worst, worst_slab, energy);
         json more = {{"wall_s", both_wall},
                      {"threads", omp_get_max_threads()},
@@ -190,14 +193,14 @@ bench::Panel measure_tables(double reference, std::size_t cells, json& out) {
         const double n = static_cast<double>(each.size()), mean = sum / n;
         const double seconds = table_cells * factor * mean;
         const double error = table_cells * factor * std::sqrt((squares / n - mean * mean) / (n - 1));
-        std::printf("both tables, %s, to %.0e: %.3g +- %.1g processor seconds, from %zu cells\n", kSeries[method].name,
+        std::printf("both tables, %s, to %.0e: %.3g +- %.1g processor seconds, from %zu cells\n", kNames[method],
                     target, seconds, error, each.size());
         report(method, target, seconds, {{"processor_s_error", error}, {"from_cells", each.size()}});
     };
     for (const double target : {1e-2, 3e-3, 1e-3}) estimate(kAnalog, target, cost[0], 1 / (target * target));
     estimate(kRandom, 1e-2, cost[1], 1);
     estimate(kRandom, 3e-3, cost[2], 1);
-    return panel;
+    return out;
 }
 
 // Random against deterministic ----------------------------------------------------------------------------------------
@@ -206,9 +209,9 @@ constexpr int kRepetitions = 8;
 
 /// Eight independent runs of the random solver per (sigma, g), each cell at another offset or inclination. Differences
 /// of their mean lobe from the deterministic one, projected on three functions of the bins, are noise if both are
-/// right: t-values of seven degrees, whose p-values fall evenly into twenty classes.
-/// Stated errors are honest if true squares less stated squares are 0 on average.
-/// @return whether p-values are even, in all nine tests at 1e-3 each, and errors honest within 5 deviations
+/// right: t-values of seven degrees of freedom, whose p-values are uniform over twenty classes.
+/// Stated errors are correct if true squares minus stated squares are 0 on average.
+/// @return whether p-values are uniform, in all nine tests at 1e-3 each, and errors correct within 5 deviations
 bool compare(json& out) {
     const tables::Request axes = tables::default_request();
     const char* const functions[] = {"cos", "cos 4", "random signs"};
@@ -217,7 +220,7 @@ bool compare(json& out) {
         const std::vector<double>& along = disc ? axes.h.values : axes.theta_i.values;
         const std::size_t sides = disc ? 1 : 2;
         std::vector<std::vector<double>> p(3 * sides);
-        std::vector<double> excess;  // (true error^2 less stated error^2) over the latter
+        std::vector<double> excess;  // (true error^2 - stated error^2) / stated error^2
         std::size_t skipped = 0;
         for (std::size_t ig = 0; ig < axes.g.size(); ++ig) {
             const bench::SliceSolver solver(disc, axes.g.values[ig], 3e-4, true);
@@ -235,13 +238,13 @@ bool compare(json& out) {
                         square[r] = std::pow(bench::relative_l2(found[r][side].lobe, truth), 2);
                         all += stated[r] = std::pow(found[r][side].standard_error, 2);
                     }
-                    // Where the noise is near what the deterministic solver promises, the difference is of both: at
-                    // twenty times it that adds at most 1/400.
+                    // Where the noise is close to the error of the deterministic solver, the difference contains both:
+                    // at twenty times that error it adds at most 1/400.
                     if (std::sqrt(all / kRepetitions) < 20 * exact[side].standard_error + 1e-5) {
                         ++skipped;
                         continue;
                     }
-                    // Of scale 1 by the other repetitions' errors, so that the mean is 0 if errors are honest.
+                    // Normalised by the errors of the other repetitions, so that the mean is 0 if errors are correct.
                     double sum = 0;
                     for (std::size_t r = 0; r < kRepetitions; ++r)
                         sum += (square[r] - stated[r]) / (all - stated[r]) * (kRepetitions - 1) / kRepetitions;
@@ -270,7 +273,7 @@ bool compare(json& out) {
         for (const double x : excess) deviation += (x - mean) * (x - mean);
         deviation = std::sqrt(deviation) / double(excess.size());
         std::printf(
-            "random against deterministic, %s: %zu (sigma, g), %zu lobes, %zu more below the other's error\n"
+            "random against deterministic, %s: %zu (sigma, g), %zu lobes, %zu skipped: below the error of the other\n"
             "  (true / stated error of the random solver)^2 - 1: %.3f +- %.3f\n",
             disc ? "disc" : "slab", axes.sigma.size() * axes.g.size(), excess.size(), skipped, mean, deviation);
         agree = agree && std::abs(mean) < 5 * deviation;
@@ -278,7 +281,7 @@ bool compare(json& out) {
         for (std::size_t t = 0; t < p.size(); ++t) {
             const double chi = test::evenness_p(p[t], 20);
             const double least = *std::min_element(p[t].begin(), p[t].end());
-            // The most extreme of n: Bonferroni.
+            // Bonferroni for the most extreme of n.
             const bool good = chi > 1e-3 && least * double(p[t].size()) > 1e-3;
             agree = agree && good;
             const char* lobe = disc ? "lobe" : (t < 3 ? "back" : "forward");
@@ -301,33 +304,74 @@ bool compare(json& out) {
     return agree;
 }
 
+// Figure --------------------------------------------------------------------------------------------------------------
+
+/// Of the numbers that --json writes.
+plot::Figure figure_of(const json& numbers) {
+    const char* const colours[] = {plot::grey, plot::blue, plot::vermilion};
+    const char* const labels[] = {"analog tracer", "Monte Carlo tracer", "deterministic solver"};
+    const auto curve = [&](std::size_t method) {
+        plot::Curve c;
+        c.label = labels[method], c.colour = colours[method], c.width = 2, c.marks = true;
+        return c;
+    };
+    plot::Figure figure;
+    figure.title = "Relative L2 error of a lobe (720 bins) against processor seconds";
+    for (std::size_t m = 0; m < kMethods; ++m) figure.legend.push_back(curve(m));
+    std::vector<plot::Panel> panels;
+    for (const json& cell : numbers.value("cells", json::array())) {
+        plot::Panel panel;
+        panel.title = plot::printable(cell.at("cell"));
+        for (std::size_t m = 0; m < kMethods; ++m) {
+            plot::Curve c = curve(m);
+            for (const json& point : cell.at("seconds_error").at(kNames[m]))
+                c.x.push_back(point.at(0)), c.y.push_back(point.at(1));
+            panel.curves.push_back(std::move(c));
+        }
+        panels.push_back(std::move(panel));
+    }
+    bench::add_panels(figure, 4, "processor seconds of one cell", 1e-6, std::move(panels));
+    if (!numbers.contains("tables")) return figure;
+    plot::Panel panel;
+    panel.title = "both default tables, by target error";
+    for (std::size_t m = 0; m < kMethods; ++m) {
+        plot::Curve c = curve(m);
+        for (const json& row : numbers.at("tables"))
+            if (row.at("method") == kNames[m]) c.x.push_back(row.at("processor_s")), c.y.push_back(row.at("error"));
+        panel.curves.push_back(std::move(c));
+    }
+    bench::add_panels(figure, 4, "processor seconds of both tables", 1e-6, {panel});
+    return figure;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-    std::string json_file, svg_file;
+    std::string json_file, figure_file, numbers_file;
     bool cells_too = true, tables = false, compared = false;
     double reference = 0;
     std::size_t cells = 32;
     CLI::App app("Run time against error of the solvers");
-    app.add_flag("!--no-cells", cells_too, "leave the twelve cells out");
+    app.add_flag("!--no-cells", cells_too, "skip the twelve cells");
     app.add_flag("--tables", tables, "time both default tables too");
-    app.add_option("--reference", reference, "with --tables: target error of a finer grid to take true errors from");
-    app.add_option("--cells", cells, "with --tables: cells per table that the random methods' time is estimated from");
+    app.add_option("--reference", reference, "with --tables: target error of a finer grid for the true errors");
+    app.add_option("--cells", cells, "with --tables: cells per table for the estimate of the random methods' time");
     app.add_flag("--compare", compared, "random against deterministic over every (sigma, g) of both tables");
     app.add_option("--json", json_file, "write the numbers to FILE");
-    app.add_option("--svg", svg_file, "draw them into FILE");
+    app.add_option("--figure", figure_file, "draw them into FILE: .svg, .png or .html");
+    app.add_option("--from", numbers_file, "measure nothing: draw the numbers that --json wrote into FILE");
     CLI11_PARSE(app, argc, argv);
 
-    json out = {{"instruction_set", tracer_target()}};
-    std::vector<bench::Panel> panels;
-    for (const TableCell& c : kCells) {
-        if (!cells_too) break;
-        panels.push_back(measure(c));
-        out["cells"].push_back({{"cell", panels.back().title}, {"seconds_error", to_json(panels.back().points)}});
+    if (!numbers_file.empty()) {
+        bench::save(figure_of(json::parse(std::ifstream(numbers_file))), figure_file);
+        return 0;
     }
-    if (tables) panels.push_back(measure_tables(reference, cells, out["tables"]));
+    json out = {{"instruction_set", tracer_target()}};
+    for (const TableCell& c : kCells)
+        if (cells_too) out["cells"].push_back(measure(c));
+    if (tables) out["tables"] = measure_tables(reference, cells);
     const bool agree = !compared || compare(out["compare"]);
     if (!json_file.empty()) std::ofstream(json_file) << out.dump(1) << '\n';
-    if (!svg_file.empty()) std::ofstream(svg_file) << bench::svg(panels, kSeries);
+    if (!figure_file.empty()) bench::save(figure_of(out), figure_file);
     return agree ? 0 : 1;
 }

@@ -1,4 +1,4 @@
-// The random solver by itself: scatterings per second, efficiency against the analog tracer over the default axes, and
+// The fast random solver: collisions per second, efficiency against the analog tracer over the default axes, and
 // z-scores against the deterministic solvers. All on one thread, measured in turn in one process.
 // Usage: bench_tracer [--cells N] [--json FILE]; --zscores visits all (sigma, g) of both tables (minutes).
 #include <algorithm>
@@ -24,10 +24,10 @@ namespace {
 
 constexpr std::size_t kBins = 720;
 
-/// Processor time: the machine's other work costs less of it than of the wall's.
+/// Processor time, which other work on the machine disturbs less than wall time.
 double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-/// Seconds of the fastest of `runs` runs: other work on the machine only adds.
+/// Seconds of the fastest of `runs` runs, since other work on the machine can only slow a run down.
 template <class Run>
 double seconds(int runs, Run&& run) {
     double best = HUGE_VAL;
@@ -55,9 +55,9 @@ void write(const char* format, ...) {
     json += text;
 }
 
-/// Walks with payments withheld: scattering, flights, compaction and the choice of who would be paid.
+/// Paths without deposits: scattering, flights, compaction and the selection of depositing vertices.
 void events_per_second() {
-    std::printf("Million scatterings per second on one core, walks without payments\n");
+    std::printf("Million collisions per second on one core, paths without deposits\n");
     json += "\"events\":[";
     const char* comma = "";
     for (const std::string& target : tracer_targets()) {
@@ -67,13 +67,13 @@ void events_per_second() {
             for (const double sigma : {2.0, 16.0, 100.0}) {
                 TracerCell cell;
                 cell.medium = medium, cell.sigma = sigma, cell.g = 0.9, cell.h = 0.3, cell.theta_i = 0.3;
-                cell.plan.forced = 0, cell.plan.pay = 1e30f;
+                cell.plan.forced = 0, cell.plan.roulette = 1e30f;
                 TracerSums sums;
-                WalkTracer tracer(cell);
-                const auto walks = static_cast<std::uint64_t>(4e6 / sigma);
+                PathTracer tracer(cell);
+                const auto count = static_cast<std::uint64_t>(4e6 / sigma);
                 const double t = seconds(5, [&] {
                     sums = {};
-                    tracer.trace(0, 0, walks, sums);
+                    tracer.trace(0, 0, count, sums);
                 });
                 const double rate = static_cast<double>(sums.scatterings) / t;
                 const char* name = medium == Medium::disc ? "disc" : "slab";
@@ -93,7 +93,7 @@ struct Cell {
     double sigma, g, along;  ///< h or theta_i
 };
 
-/// Error and time of either tracer; the slab's error is that of its worse lobe.
+/// Error and time of a tracer; the slab's error is that of its worse lobe.
 struct Spent {
     double error, time;
     double efficiency() const { return 1 / (error * error * time); }
@@ -123,7 +123,7 @@ Spent fast(bool disc, const Cell& c, double target, int runs) {
     return s;
 }
 
-/// 1 / (variance x time) over cells of the default axes drawn at random (sigma = 0 is closed form and left out).
+/// 1 / (variance x time) over random cells of the default axes (without sigma = 0, a closed form).
 void efficiency(std::size_t cells, double target) {
     const tables::Request axes = tables::default_request();
     std::printf("Efficiency 1 / (variance x time) over the analog tracer's, 720 bins, to %.1f %%, %zu random cells\n",

@@ -1,10 +1,11 @@
-// A stand-in for the simulated disc table: single scattering in a homogeneous disc, every lobe normalised.
-// Rests on quadrature alone, so that benches and tests of tensor/ need no simulation.
+// A substitute for the simulated disc table: single scattering in a homogeneous disc, every lobe normalised.
+// Needs quadrature only, so that benchmarks and tests of tensor/ need no simulation.
 #pragma once
 
 #include <array>
 #include <cmath>
 
+#include "medulla/phase.hpp"
 #include "tensor/dense.hpp"
 
 namespace medulla::tensor {
@@ -13,7 +14,6 @@ namespace medulla::tensor {
 /// angle phi, and leaves. Graded axes sigma = 16 u^2, g = 0.95 (1 - (1-u)^1.5), h = sin(pi u / 2), u at cell centres
 /// (at sigma = 0 and h = 1 there is nothing to normalise); phi at the centres of equal bins.
 inline Tensor single_scattering_table(std::size_t sigmas, std::size_t gs, std::size_t hs, std::size_t bins) {
-    const double pi = 3.14159265358979323846;
     constexpr int nodes = 64;  // midpoints along the chord
     const auto u = [](std::size_t i, std::size_t n) { return (static_cast<double>(i) + 0.5) / static_cast<double>(n); };
     Tensor table({sigmas, gs, hs, bins});
@@ -34,7 +34,7 @@ inline Tensor single_scattering_table(std::size_t sigmas, std::size_t gs, std::s
                 for (double s : path) sum += std::exp(-sigma * s);
                 for (std::size_t j = 0; j < gs; ++j) {
                     const double g = 0.95 * (1 - std::pow(1 - u(j, gs), 1.5));
-                    table({i, j, k, l}) = (1 - g * g) / (2 * pi * (1 + g * g - 2 * g * std::cos(phi))) * sum / nodes;
+                    table({i, j, k, l}) = planar_hg_pdf(phi, g) * sum / nodes;
                 }
             }
         }

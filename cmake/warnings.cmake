@@ -1,8 +1,8 @@
-# One interface target that every target of ours links: warnings, and the floating-point promise.
+# An interface target that every target links: warnings, and reproducible floating point.
 add_library(medulla_warnings INTERFACE)
 target_compile_options(medulla_warnings INTERFACE
   -Wall -Wextra -Wconversion -Wshadow -Wno-sign-conversion
-  # Contraction to fused multiply-add would make the same source print other bits on another target.
+  # Contraction to fused multiply-add would give different bits on different targets.
   -ffp-contract=off)
 option(MEDULLA_WERROR "Treat warnings as errors" OFF)
 if(MEDULLA_WERROR)

@@ -1,4 +1,4 @@
-// libFuzzer: text -> a material, a scene. What is accepted must be a fibre that the model can answer for.
+// libFuzzer: text -> a material, a scene. Accepted materials must be valid fibres of the model.
 #include <cstdlib>
 
 #include "medulla/fur_parameters.hpp"

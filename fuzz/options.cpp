@@ -1,5 +1,5 @@
-// libFuzzer: the command lines of both programs, one word per line. The first byte says which program. Words are parsed
-// and checked as the program does it; nothing is run.
+// libFuzzer: command lines of both programs, one argument per line; the first byte selects the program. Arguments are
+// parsed and checked as by the program; nothing is executed.
 #define main medulla_precompute_main
 #include "tables/programs/medulla_precompute.cpp"
 #undef main
@@ -8,21 +8,21 @@
 
 namespace {
 
-std::vector<std::string> words_of(const unsigned char* data, std::size_t size) {
-    std::vector<std::string> words(1);
+std::vector<std::string> arguments_of(const unsigned char* data, std::size_t size) {
+    std::vector<std::string> arguments(1);
     for (std::size_t i = 0; i < size; ++i)
         if (data[i] == '\n')
-            words.emplace_back();
-        else if (data[i] != 0)  // no word of a command line holds a zero byte
-            words.back() += static_cast<char>(data[i]);
-    return words;
+            arguments.emplace_back();
+        else if (data[i] != 0)  // no argument contains a zero byte
+            arguments.back() += static_cast<char>(data[i]);
+    return arguments;
 }
 
-// Declared once, since that takes longer than to parse; CLI11 forgets what it parsed before.
+// Declared once, since that takes longer than parsing; CLI11 resets its state at each parse.
 struct Precompute {
     CLI::App app{"fuzz"};
-    Words words;
-    Precompute() { declare(app, words); }
+    Options options;
+    Precompute() { declare(app, options); }
 };
 struct Furtable {
     CLI::App app{"fuzz"};
@@ -34,21 +34,21 @@ struct Furtable {
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t size) {
     if (size == 0 || size > 4096) return 0;
-    std::vector<std::string> words = words_of(data + 1, size - 1);
-    for (const std::string& word : words)
-        if (word.empty()) return 0;            // refused before they are parsed (tables/programs/program.cpp)
-    std::reverse(words.begin(), words.end());  // CLI11 takes a vector from its end
+    std::vector<std::string> arguments = arguments_of(data + 1, size - 1);
+    for (const std::string& argument : arguments)
+        if (argument.empty()) return 0;                // refused before parsing (tables/programs/program.cpp)
+    std::reverse(arguments.begin(), arguments.end());  // CLI11 expects the vector in reverse order
     try {
         if (data[0] % 2 == 0) {
             static Precompute program;
-            program.words = Words();
-            program.app.parse(words);
-            const Job job = job_of(program.words);
-            if (job.shard && (job.shard->index < 1 || job.shard->index > job.shard->count)) std::abort();
+            program.options = Options();
+            program.app.parse(arguments);
+            const Job job = job_of(program.options);
+            if (job.share && (job.share->index < 1 || job.share->index > job.share->count)) std::abort();
             check_request(job.request);
         } else {
             static Furtable program;
-            program.app.parse(words);
+            program.app.parse(arguments);
         }
     } catch (const CLI::Error&) {
     } catch (const Error&) {

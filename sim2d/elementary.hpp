@@ -1,5 +1,5 @@
-// log, exp, sin, cos, atan2 of + - * / and sqrt alone: the same bits on every processor and with every C library (glibc
-// picks other code, with other roundings, where there is AVX2 and FMA). Reductions and polynomials are those of fdlibm:
+// log, exp, sin, cos and atan2 from + - * / and sqrt alone: the same bits on every processor and with every C library
+// (glibc selects code that rounds differently where there is AVX2 and FMA). Reductions and polynomials of fdlibm:
 // Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved. Developed at SunPro, a Sun Microsystems, Inc.
 // business. Permission to use, copy, modify, and distribute this software is freely granted, provided that this notice
 // is preserved.
@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+
+#include "medulla/config.hpp"
 
 /// Built with -ffp-contract=off (cmake/warnings.cmake). Errors: tests/test_elementary.cpp.
 namespace medulla::sim2d::portable {
@@ -98,7 +100,7 @@ inline double log(double x) noexcept {
 inline double exp(double x) noexcept {
     if (!(x <= 709.782712893383973096)) return x > 0 ? std::numeric_limits<double>::infinity() : x;
     if (x < -745.133219101941108420) return 0;
-    // The nearest whole number, without floor, which is a call where SSE2 is all there is.
+    // Rounds to the nearest integer without floor, which is a function call on plain SSE2.
     const double k = (x * 1.44269504088896338700 + 0x1.8p52) - 0x1.8p52;
     const double high = x - k * detail::ln2_high, low = k * detail::ln2_low, r = high - low, z = r * r;
     const double c = r - z * (1.66666666666666019037e-01 +
@@ -143,11 +145,11 @@ inline double cos(double x) noexcept {
     return -detail::cos_near_0(2 * detail::half_pi_high - a, 2 * detail::half_pi_low);
 }
 
-/// Angle of (x, y) in [-pi, pi], finite arguments; 0 for (0, 0) with the sign of y.
+/// Angle of (x, y) in [-pi, pi], finite arguments; 0 for (0, 0) with the sign of y. NaN of NaN.
 inline double atan2(double y, double x) noexcept {
     const double a = std::abs(x), b = std::abs(y);
     if (b > 0x1p64 * a) return std::copysign(detail::half_pi_high, y);
-    double angle = a == 0 ? 0 : detail::atan_of_positive(b / a);
+    double angle = a == 0 && b == 0 ? 0 : detail::atan_of_positive(b / a);
     if (std::signbit(x)) angle = 2 * detail::half_pi_high - (angle - 2 * detail::half_pi_low);
     return std::copysign(angle, y);
 }
@@ -156,10 +158,15 @@ inline double atan2(double y, double x) noexcept {
 inline double asin(double x) noexcept { return atan2(x, std::sqrt((1 - x) * (1 + x))); }
 inline double acos(double x) noexcept { return atan2(std::sqrt((1 - x) * (1 + x)), x); }
 
-/// The runtime's planar_hg_pdf (medulla/phase.hpp), |t| <= 2 pi.
+/// planar_hg_pdf of medulla/phase.hpp with the functions above.
+/// @param sin_half, cos_half of half the scattering angle; only the one that |g| -> 1 makes small is used
+inline double planar_hg_pdf_of_half(double sin_half, double cos_half, double g) noexcept {
+    const double half = g < 0 ? cos_half : sin_half, a = std::abs(g);
+    return (1 - a) * (1 + a) / (2 * pi * ((1 - a) * (1 - a) + 4 * a * half * half));
+}
+/// @param t scattering angle [radians], |t| <= 2 pi
 inline double planar_hg_pdf(double t, double g) noexcept {
-    const double half = g < 0 ? cos(t / 2) : sin(t / 2), a = std::abs(g);
-    return (1 - a) * (1 + a) / (2 * 3.14159265358979323846 * ((1 - a) * (1 - a) + 4 * a * half * half));
+    return g < 0 ? planar_hg_pdf_of_half(0, cos(t / 2), g) : planar_hg_pdf_of_half(sin(t / 2), 0, g);
 }
 
 }  // namespace medulla::sim2d::portable

@@ -1,4 +1,4 @@
-// What every solver returns: one exit lobe over bins, normalised, with its energy and its error.
+// Result of every solver: a normalised exit lobe over bins, its energy and its errors.
 #pragma once
 
 #include <vector>
@@ -13,15 +13,15 @@ struct Profile {
     double energy = 0;          ///< scattered energy per unit incident energy, in [0, 1]
     double energy_error = 0;    ///< standard error of `energy` (0 where it is a closed form)
     double standard_error = 0;  ///< relative L2 error of `lobe`: |error| / |lobe| over the bins
-    double mean_length =
-        0;  ///< mean path length inside the medium of the scattered light [radii]; infinite in an empty slab
+    /// Mean path length of the scattered light inside the medium [radii]; infinite in an empty slab.
+    double mean_length = 0;
 };
 
 /// Both exit lobes of one (sigma, g, theta_i), each normalised to integral 1 over theta_r in (-pi/2, pi/2).
 struct SlabProfile {
     Profile back;          ///< the side of the light
     Profile forward;       ///< the far side
-    double raw_total = 0;  ///< back + forward energy before it was scaled to the closed form: a solver's balance
+    double raw_total = 0;  ///< back + forward energy before scaling to the closed form: the solver's energy balance
 };
 
 }  // namespace medulla::sim2d

@@ -35,7 +35,7 @@ class RandomStream {
         return (static_cast<double>(bits >> 12) + 0.5) * 0x1p-52;
     }
 
-    /// Uniform on the unit circle without trigonometry: a point of the unit disc, its angle doubled.
+    /// Uniform on the unit circle without trigonometry: a point of the unit disc with its angle doubled.
     Direction<double> direction() noexcept {
         for (;;) {
             const double x = 2 * uniform() - 1, y = 2 * uniform() - 1, r2 = x * x + y * y;

@@ -1,4 +1,4 @@
-// The one error of the offline programs: a sentence that names file, field, expected and found. main() catches it once.
+// Errors of the offline programs: a sentence that names file, field, expected and found. main() catches them once.
 #pragma once
 
 #include <fmt/core.h>

@@ -30,7 +30,7 @@ void in_parallel(std::size_t count, int threads, const std::atomic<bool>& stop,
     try {
         while (others.size() + 1 < wanted && others.size() + 1 < count) others.emplace_back(work);
     } catch (const std::exception&) {
-        // The system gives no more threads or memory: those there are do it all.
+        // The system has no more threads or memory: the existing ones do all jobs.
     }
     work();
     for (std::thread& other : others) other.join();

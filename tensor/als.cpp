@@ -1,4 +1,4 @@
-// CP-ALS: each factor in turn is the least-squares solution with the others held.
+// CP-ALS: each factor in turn becomes the least-squares solution with the others fixed.
 // Kolda & Bader 2009, section 3.4; the ridge on balanced factors is Tikhonov's, see CpOptions.
 #include "tensor/als.hpp"
 
@@ -44,8 +44,8 @@ Fit als_sweeps(const SplitTensor& tensor, double scale, Factors start, const CpO
             matricised = tensor.mode(side, factors, k);
             Eigen::MatrixXd gram = gram_product(grams, k);
             RowMatrix right = matricised;
-            // Balanced columns have length w^(1/N): with the others' lengths t = w^((N-1)/N) taken out, the penalty on
-            // this factor times t is ridge / t^2. A component of weight 0 is dead then, and stays so.
+            // Balanced columns have length w^(1/N). The others are stored with unit length, t = w^((N-1)/N) taken out,
+            // so the penalty on this factor times t is ridge / t^2. A component of weight 0 stays 0.
             for (Eigen::Index r = 0; r < rank && ridge > 0 && order > 1; ++r) {
                 const double t2 = std::pow(fit.weights[r], 2 - 2 / static_cast<double>(order));
                 if (ridge < t2 / epsilon) {
@@ -61,7 +61,7 @@ Fit als_sweeps(const SplitTensor& tensor, double scale, Factors start, const CpO
             factors[k] = std::move(factor);
             grams[k] = factors[k].transpose() * factors[k];
         }
-        // |x - m|^2 = 1 - 2 <x, m> + |m|^2; rounding is that of terms up to (sum of weights)^2.
+        // |x - m|^2 = 1 - 2 <x, m> + |m|^2, with the rounding of terms up to (sum of weights)^2.
         const double total = fit.weights.sum();
         const double product = (matricised.array() * factors[order - 1].array()).colwise().sum().matrix() * fit.weights;
         double squared = 1 - 2 * product + fit.weights.dot(gram_product(grams, order) * fit.weights);
@@ -82,13 +82,18 @@ Fit als_sweeps(const SplitTensor& tensor, double scale, Factors start, const CpO
     return fit;
 }
 
-CpModel to_model(const Fit& fit, const Normalised& input) {
-    CpModel model;
+void store(const Fit& fit, const Normalised& input, const std::vector<std::size_t>& core, CpResult& result) {
+    CpModel& model = result.model;
     model.factors.assign(fit.factors.begin(), fit.factors.end());
     model.weights = fit.weights;
     canonicalise(model);
     for (double& weight : model.weights) weight = input.restore(weight);
-    return model;
+    CpReport& report = result.report;
+    report.iterations = fit.iterations;
+    report.stop = fit.stop;
+    report.trace = fit.trace;
+    report.core = core;
+    report.degeneracy = degeneracy(model, input.restore(1));
 }
 
 CpResult cp_als(const Tensor& tensor, const CpOptions& options) {
@@ -100,20 +105,12 @@ CpResult cp_als(const Tensor& tensor, const CpOptions& options) {
         result = zero_result(tensor.shape, options);
     } else {
         const SplitTensor split(input.tensor().values.data(), tensor.shape);
-        Fit best;
-        for (int start = 0; start < options.restarts.value_or(1); ++start) {
-            Fit fit = als_sweeps(split, 1 / input.norm(),
-                                 gaussian_factors(tensor.shape, options.rank, options.seed, start), options);
-            result.report.starts.push_back(fit.error);
-            if (start == 0 || fit.error < best.error) best = std::move(fit);
-        }
-        result.model = to_model(best, input);
-        result.report.iterations = best.iterations;
+        const Fit best = best_of(options.restarts.value_or(1), result.report, [&](int start) {
+            return als_sweeps(split, 1 / input.norm(),
+                              gaussian_factors(tensor.shape, options.rank, options.seed, start), options);
+        });
+        store(best, input, tensor.shape, result);
         result.report.relative_error = best.error;
-        result.report.stop = best.stop;
-        result.report.trace = best.trace;
-        result.report.core = tensor.shape;
-        result.report.degeneracy = degeneracy(result.model, input.restore(1));
     }
     result.report.solver = "als";
     result.report.ridge = options.ridge.value_or(0.0);

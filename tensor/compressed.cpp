@@ -1,5 +1,5 @@
-// The fast paths: solve on the core of a truncated HOSVD, then expand the factors by its bases.
-// Bro & Andersson 1998: |x - m|^2 = |core - m_core|^2 + |x - core x bases|^2, so nothing is lost but the truncation.
+// The fast solvers: solve on the core of a truncated HOSVD, then expand the factors with its bases.
+// Bro & Andersson 1998: |x - m|^2 = |core - m_core|^2 + |x - core x bases|^2, so only the truncation is lost.
 #include <chrono>
 #include <cmath>
 #include <functional>
@@ -13,7 +13,7 @@ namespace medulla::tensor {
 
 namespace {
 
-/// A core, ready to be solved on. Kept in place: `split` borrows the core's values.
+/// A core to solve on. Not movable, since `split` borrows the core's values.
 struct Level {
     Hosvd hosvd;
     double norm;  ///< of the core
@@ -30,7 +30,7 @@ struct Level {
     }
 };
 
-/// Factors whose columns carry the weights, evenly over the modes.
+/// Factors with the weights distributed evenly over the modes.
 Factors balanced(const Fit& fit) {
     Factors factors = fit.factors;
     const double share = 1 / static_cast<double>(factors.size());
@@ -45,9 +45,9 @@ Factors changed_basis(Factors factors, const std::vector<Eigen::MatrixXd>& from,
     return factors;
 }
 
-/// Turns each component so that its inner product with the tensor is not negative; the multiple of the model that then
-/// comes nearest to the tensor.
-double turn_towards(const Level& level, Factors& factors) {
+/// Flips components whose inner product with the tensor is negative. @return the multiple of the model that is then the
+/// closest to the tensor
+double align_signs(const Level& level, Factors& factors) {
     const RowMatrix matricised = level.split.mode(level.split.down(factors, 1 / level.norm), factors, 0);
     Eigen::RowVectorXd products = (matricised.array() * factors[0].array()).colwise().sum();
     for (Eigen::Index r = 0; r < products.size(); ++r)
@@ -57,14 +57,14 @@ double turn_towards(const Level& level, Factors& factors) {
     return products.cwiseAbs().sum() / gram.sum();
 }
 
-/// A guess at a fifth of the error that smooth tensors leave at this rank; where it is wrong, a finer core follows.
+/// About a fifth of the error of smooth tensors at this rank; if the error turns out smaller, a finer core follows.
 double first_truncation(int rank) { return rank <= 16 ? 3e-3 : rank <= 48 ? 1e-3 : 2e-4; }
 
-/// What both compressed solvers do: a first solve, and where its error comes near the truncation, finer cores.
+/// The steps of both compressed solvers: a first solve, then finer cores while the error is close to the truncation.
 struct Recipe {
     double truncation;                                            ///< of the first core
     std::function<Fit(const Level&, CpReport&)> first;            ///< all starts
-    std::function<Fit(const Level&, const Fit&, Factors)> again;  ///< goes on, on a finer core
+    std::function<Fit(const Level&, const Fit&, Factors)> again;  ///< continues on a finer core
 };
 
 CpResult solve_compressed(const Tensor& tensor, const CpOptions& options, const Recipe& recipe, const char* name) {
@@ -79,7 +79,7 @@ CpResult solve_compressed(const Tensor& tensor, const CpOptions& options, const 
         double truncation = options.truncation.value_or(recipe.truncation);
         auto level = std::make_unique<Level>(truncated_hosvd(input.tensor(), truncation));
         Fit fit = recipe.first(*level, report);
-        // At a fifth of the error the truncation adds a fiftieth to it.
+        // A truncation of a fifth of the error adds a fiftieth to it.
         while (!options.truncation && truncation > finest_truncation &&
                level->total_error(fit, input.norm()) < 5 * truncation) {
             truncation = std::max(finest_truncation, truncation / 30);
@@ -95,16 +95,11 @@ CpResult solve_compressed(const Tensor& tensor, const CpOptions& options, const 
         for (std::size_t k = 0; k < fit.factors.size(); ++k)
             fit.factors[k] = (level->hosvd.bases[k] * fit.factors[k]).eval();
         fit.weights *= level->norm / input.norm();
-        result.model = to_model(fit, input);
-        report.iterations = fit.iterations;
-        report.stop = fit.stop;
-        report.trace = fit.trace;
-        report.core = level->hosvd.core.shape;
+        store(fit, input, level->hosvd.core.shape, result);
         report.truncation_error = level->hosvd.error;
         report.ridge = fit.ridge;
-        report.degeneracy = degeneracy(result.model, input.restore(1));
         report.relative_error = level->total_error(fit, input.norm());
-        // Gram matrices know the truncation to 1e-8 at best: near there, measure.
+        // Gram matrices resolve the truncation to 1e-8 at best: for small errors, evaluate explicitly.
         if (report.relative_error < 1e-5) report.relative_error = relative_error(tensor, result.model);
     }
     report.solver = name;
@@ -118,14 +113,10 @@ CpResult cp_als_compressed(const Tensor& tensor, const CpOptions& options) {
     Recipe recipe;
     recipe.truncation = first_truncation(options.rank);
     recipe.first = [&](const Level& level, CpReport& report) {
-        Fit best;
-        for (int start = 0; start < options.restarts.value_or(1); ++start) {
-            Fit fit = als_sweeps(level.split, 1 / level.norm,
-                                 gaussian_factors(level.hosvd.core.shape, options.rank, options.seed, start), options);
-            report.starts.push_back(fit.error);
-            if (start == 0 || fit.error < best.error) best = std::move(fit);
-        }
-        return best;
+        return best_of(options.restarts.value_or(1), report, [&](int start) {
+            return als_sweeps(level.split, 1 / level.norm,
+                              gaussian_factors(level.hosvd.core.shape, options.rank, options.seed, start), options);
+        });
     };
     recipe.again = [&](const Level& level, const Fit&, Factors start) {
         return als_sweeps(level.split, 1 / level.norm, std::move(start), options);
@@ -143,34 +134,33 @@ CpResult cp_lm(const Tensor& tensor, const CpOptions& options) {
     recipe.truncation = first_truncation(options.rank);
     recipe.first = [&](const Level& level, CpReport& report) {
         const double ridge = options.ridge.value_or(options.rank < 32 ? 1e-5 : 1e-6);
-        Fit best;
-        for (int start = 0; start < options.restarts.value_or(options.rank <= 32 ? 2 : 1); ++start) {
+        const int starts = options.restarts.value_or(options.rank <= 32 ? 2 : 1);
+        Fit best = best_of(starts, report, [&](int start) {
             Factors factors = gaussian_factors(level.hosvd.core.shape, options.rank, options.seed, start);
-            // Columns about as long as those of `rank` equal orthogonal components that make up the tensor.
+            // Column lengths of `rank` equal orthogonal components whose sum has the norm of the tensor.
             for (RowMatrix& f : factors)
                 f *= std::pow(options.rank, -0.5 / static_cast<double>(factors.size())) /
                      std::sqrt(static_cast<double>(f.rows()));
-            const double gain = turn_towards(level, factors);
+            const double gain = align_signs(level, factors);
             Fit fit = solve(level, factors, ridge);
             if (!(fit.error < 1)) {
-                // Steps can end at the model 0, a saddle. From a start nearer to the tensor than 0 is, they cannot.
+                // Steps can end at the zero model, a saddle point, but not from a start closer to the tensor than 0.
                 for (RowMatrix& f : factors) f *= std::pow(gain, 1 / static_cast<double>(factors.size()));
                 fit = solve(level, std::move(factors), ridge);
             }
-            report.starts.push_back(fit.error);
-            if (start == 0 || fit.error < best.error) best = std::move(fit);
-        }
-        // Where components cancel all the same, more ridge: what CpReport calls degenerate is not returned unasked.
+            return fit;
+        });
+        // If components still cancel, more ridge: a degenerate model is returned only on request.
         while (!options.ridge && best.weights.sum() > 10 && best.ridge < 0.1) {
-            Fit held = solve(level, balanced(best), 4 * best.ridge);
-            held.trace.insert(held.trace.begin(), best.trace.begin(), best.trace.end());
-            held.iterations += best.iterations;
-            best = std::move(held);
+            Fit next = solve(level, balanced(best), 4 * best.ridge);
+            next.trace.insert(next.trace.begin(), best.trace.begin(), best.trace.end());
+            next.iterations += best.iterations;
+            best = std::move(next);
         }
         return best;
     };
     recipe.again = [&](const Level& level, const Fit& before, Factors start) {
-        // A fit this good is worth a smaller ridge, as long as components do not begin to cancel.
+        // Such a good fit allows a smaller ridge, as long as components do not start to cancel.
         double ridge = before.ridge;
         Fit fit = solve(level, std::move(start), ridge);
         while (!options.ridge && ridge > 0 && (fit.stop == Stop::converged || fit.stop == Stop::stalled)) {

@@ -1,5 +1,4 @@
-// What a CP model is worth: expansion, error, canonical form, degeneracy, and the words of a report.
-// Rests on cp.hpp, mttkrp.hpp.
+// CP models: expansion, error, canonical form, degeneracy, the text of a report; and the choice of a solver.
 #include "tensor/cp.hpp"
 
 #include <algorithm>
@@ -18,7 +17,7 @@ namespace {
 
 Factors row_major(const CpModel& model) { return Factors(model.factors.begin(), model.factors.end()); }
 
-/// Inner products of the components of a canonical model, weights left out.
+/// Inner products of the unweighted components of a canonical model.
 Eigen::MatrixXd cosines_of(const CpModel& model) {
     Eigen::MatrixXd cosines = Eigen::MatrixXd::Ones(model.weights.size(), model.weights.size());
     for (const auto& factor : model.factors) cosines.array() *= (factor.transpose() * factor).array();
@@ -26,6 +25,18 @@ Eigen::MatrixXd cosines_of(const CpModel& model) {
 }
 
 }  // namespace
+
+CpResult cp(const Tensor& tensor, Solver solver, const CpOptions& options) {
+    switch (solver) {
+        case Solver::als:
+            return cp_als_compressed(tensor, options);
+        case Solver::lm:
+            return cp_lm(tensor, options);
+        case Solver::nonnegative:
+            return cp_nonnegative(tensor, options);
+    }
+    throw std::invalid_argument("cp: no such solver");
+}
 
 std::vector<std::size_t> CpModel::shape() const {
     std::vector<std::size_t> lengths;
@@ -120,19 +131,9 @@ Degeneracy degeneracy(const CpModel& model, double tensor_norm) {
 }
 
 std::string to_string(Stop stop) {
-    switch (stop) {
-        case Stop::converged:
-            return "converged";
-        case Stop::sweeps:
-            return "sweeps spent";
-        case Stop::exact:
-            return "exact to rounding";
-        case Stop::stalled:
-            return "no step lowers the objective";
-        case Stop::zero_tensor:
-            return "the tensor is zero";
-    }
-    return "unknown";
+    constexpr const char* texts[] = {"converged", "sweeps spent", "exact to rounding", "no step lowers the objective",
+                                     "the tensor is zero"};
+    return texts[static_cast<std::size_t>(stop)];
 }
 
 std::string summary(const CpReport& report) {

@@ -53,7 +53,7 @@ void require_valid(const Tensor& tensor) {
         throw std::invalid_argument("tensor: the shape has " + std::to_string(cells) + " cells, but there are " +
                                     std::to_string(tensor.size()) + " values");
     for (std::size_t from = 0; from < cells; from += block) {
-        // 0 x is 0 where x is finite, and not a number where it is not.
+        // 0 x is 0 for finite x, and NaN otherwise.
         if ((view(tensor, from) * 0).sum() == 0) continue;
         for (std::size_t p = from;; ++p) {
             const double x = tensor.values[p];
@@ -74,7 +74,8 @@ double norm(const Tensor& tensor) {
     const int exponent = std::ilogb(largest);
     double sum = 0;
     if (std::abs(exponent) <= 400) {
-        // Squares stay within 2^+-800 and 2^60 of them below 2^1024; what underflows is 2^-100 of the largest.
+        // Squares are within 2^+-800, and 2^60 of them below 2^1024; values that underflow are below 2^-100 of the
+        // largest.
         for (std::size_t from = 0; from < tensor.size(); from += block) sum += view(tensor, from).square().sum();
         return std::sqrt(sum);
     }

@@ -1,5 +1,5 @@
 // A dense tensor of any order: a shape and its values, last axis fastest.
-// Rests on the standard library alone; everything else in this folder takes and returns it.
+// Uses the standard library only; everything else in this folder takes and returns it.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ namespace medulla::tensor {
 /// Dense array of doubles, row-major: values[((i0 * n1 + i1) * n2 + i2) ...]. Order 1 and above, no axis of length 0.
 struct Tensor {
     std::vector<std::size_t> shape;  ///< length of each axis, slowest first
-    std::vector<double> values;      ///< product(shape) of them
+    std::vector<double> values;      ///< product(shape) values
 
     Tensor() = default;
     /// All zeros. Throws std::invalid_argument where an axis is empty or the product overflows.
@@ -39,7 +39,7 @@ double max_abs(const Tensor& tensor);
 /// Square root of the sum of squares; scaled by max |x|, so that it overflows only where the norm itself does.
 double norm(const Tensor& tensor);
 
-/// Every value times 2^exponent: exact but where a value leaves the range of doubles.
+/// Every value times 2^exponent: exact unless a value leaves the range of doubles.
 Tensor scaled(const Tensor& tensor, int exponent);
 
 }  // namespace medulla::tensor

@@ -1,5 +1,5 @@
-// Truncation mode by mode: Gram matrix and eigenvectors, or for long modes a random range finder that grows until
-// what it misses is small. Rests on Eigen and OpenMP.
+// Truncation mode by mode: Gram matrix and eigenvectors, or for long modes a random range finder that grows until the
+// missed part is small. Uses Eigen and OpenMP.
 #include "tensor/hosvd.hpp"
 
 #include <algorithm>
@@ -22,12 +22,12 @@ struct ModeView {
     }
 };
 
-constexpr Index block_length = 2048;  // 16 nodes of it fill 256 KB; fixed, since it fixes the order of sums
+constexpr Index block_length = 2048;  // 16 nodes of it fill 256 KB. A constant, since it decides the order of sums
 
-/// The lower triangle, which is all that eigenvectors need.
+/// Lower triangle of the Gram matrix, which is all that the eigenvectors need.
 Eigen::MatrixXd gram(const Tensor& tensor, std::size_t mode) {
     const ModeView view(tensor.shape, mode);
-    // Partial sums by fixed share of the work, added in order.
+    // Partial sums over fixed parts of the work, added in order.
     const Index blocks = view.inner == 1 ? (view.outer + block_length - 1) / block_length
                                          : view.outer * ((view.inner + block_length - 1) / block_length);
     const Index shares = std::min<Index>(16, blocks);
@@ -54,7 +54,7 @@ Eigen::MatrixXd gram(const Tensor& tensor, std::size_t mode) {
     return sums[0];
 }
 
-/// Eigenvectors of the leading eigenvalues, as few as leave at most `budget` of the trace; what they leave.
+/// Eigenvectors of the leading eigenvalues, as few as leave at most `budget` of the trace, and the part they leave.
 struct Leading {
     Eigen::MatrixXd vectors;
     double left = 0;
@@ -72,8 +72,8 @@ Leading leading(const Eigen::MatrixXd& symmetric, double budget) {
     return {eigen.eigenvectors().rightCols(n - drop).rowwise().reverse(), left};
 }
 
-/// The unfolding nodes x (everything else), copied.
-Eigen::MatrixXd unfold(const Tensor& tensor, std::size_t mode) {
+/// The matricised tensor, nodes x (all other modes), copied.
+Eigen::MatrixXd matricise(const Tensor& tensor, std::size_t mode) {
     const ModeView view(tensor.shape, mode);
     Eigen::MatrixXd result(view.nodes, view.outer * view.inner);
     for (Index o = 0; o < view.outer; ++o)
@@ -82,9 +82,9 @@ Eigen::MatrixXd unfold(const Tensor& tensor, std::size_t mode) {
     return result;
 }
 
-/// A basis of a long mode: random blocks until the part missed is a tenth of the budget, then truncated.
+/// A basis of a long mode: random blocks until the missed part is a tenth of the budget, then truncation.
 Leading leading_of_long_mode(const Tensor& tensor, std::size_t mode, double squared_norm, double budget) {
-    const Eigen::MatrixXd a = unfold(tensor, mode);
+    const Eigen::MatrixXd a = matricise(tensor, mode);
     const Index most = std::min(a.rows(), a.cols()), block = 32;
     Eigen::MatrixXd basis(a.rows(), 0), coefficients(0, a.cols());
     double missed = squared_norm;
@@ -155,7 +155,7 @@ Hosvd truncated_hosvd(const Tensor& tensor, double relative_error) {
     for (std::size_t step = 0; step < order; ++step) {
         const std::size_t k = modes[step];
         const Tensor& current = step == 0 ? tensor : result.core;
-        // What a mode leaves of its share passes to the next.
+        // The unused part of a mode's budget passes to the next.
         const double budget = (allowed - left) / static_cast<double>(order - step);
         const Leading found = current.shape[k] > 64
                                   ? leading_of_long_mode(current, k, std::pow(norm(current), 2), budget)

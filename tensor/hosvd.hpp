@@ -12,15 +12,16 @@ namespace medulla::tensor {
 struct Hosvd {
     Tensor core;
     std::vector<Eigen::MatrixXd> bases;  ///< bases[k] is shape[k] x core.shape[k], orthonormal columns
-    double error = 0;                    ///< |tensor - core x bases| / |tensor|, from what each mode discarded
+    double error = 0;                    ///< |tensor - core x bases| / |tensor|, from the discarded part of each mode
 };
 
-/// Bases come from Gram matrices, whose rounding hides singular values below about 1e-8 of the largest: a finer
-/// request is answered as this one. (Where the spectrum ends at once, the loss is rounding all the same.)
+/// Smallest truncation. Bases come from Gram matrices, whose rounding hides singular values below about 1e-8 of the
+/// largest, so a smaller request is treated as this one.
 constexpr double finest_truncation = 1e-7;
 
 /// The smallest core, mode by mode with the longest last, whose relative error is at most `relative_error` >= 0.
-/// Expects a valid, nonzero tensor whose squares neither overflow nor underflow. Same bytes for any thread count.
+/// Expects a valid, nonzero tensor whose squares neither overflow nor underflow. The result does not depend on the
+/// number of threads.
 Hosvd truncated_hosvd(const Tensor& tensor, double relative_error);
 
 /// Tensor times matrix along one mode: result[.. j ..] = sum_i matrix(j, i) tensor[.. i ..].

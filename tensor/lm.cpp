@@ -1,5 +1,5 @@
 // Levenberg-Marquardt for CP with the longest block eliminated and the Schur complement solved by preconditioned
-// conjugate gradients. Rests on mttkrp.hpp; see lm.hpp for sources.
+// conjugate gradients. See lm.hpp for sources.
 #include "tensor/lm.hpp"
 
 #include <algorithm>
@@ -13,8 +13,9 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// Inexact Newton: loose solves of many systems beat tight solves of few. On the stand-in table of bench/ at ranks 16
-// and 128 a tenth of the residual and 20 iterations reach the error of 1e-3 and 300 in a fifth of the time.
+// Inexact Newton: loose solves of many systems are faster than tight solves of few. On the table of bench/stand_in.hpp
+// at ranks 16 and 128, a tenth of the residual and 20 iterations reach the error of 1e-3 and 300 iterations in a fifth
+// of the time (bench/bench_cp).
 constexpr double residual_kept = 0.1;
 constexpr int most_iterations = 12;
 
@@ -25,7 +26,7 @@ double squared_norm(const Factors& factors) {
     return sum;
 }
 
-/// Everything known at one point: objective, factors with balanced columns, MTTKRPs.
+/// State at one point: objective, factors with balanced columns, MTTKRPs.
 struct Point {
     Factors factors, matricised;
     double squared_error = 0, objective = 0;
@@ -49,21 +50,21 @@ class Objective {
         for (const RowMatrix& f : p.factors) all.array() *= multiplied(f.transpose(), f).array();
         const double total = all.diagonal().cwiseSqrt().sum();
         p.squared_error = 1 + all.sum() - 2 * dot(p.matricised[0], p.factors[0]);
-        // As in ALS: where rounding of the three terms shows, subtract cell by cell.
+        // As in ALS: where rounding of the three terms matters, subtract cell by cell.
         if (p.squared_error < 1e5 * std::numeric_limits<double>::epsilon() * (1 + total * total))
             p.squared_error = tensor_.residual_squared(p.factors, Eigen::VectorXd::Ones(p.factors[0].cols()), scale_);
         p.objective = (p.squared_error + ridge_ * squared_norm(p.factors)) / 2;
         return p;
     }
 
-    /// Equal column lengths across modes: the same tensor at the least penalty. MTTKRPs follow by scaling.
+    /// Makes column lengths equal across modes: the same tensor with the smallest penalty. MTTKRPs are scaled alike.
     void balance(Point& p) const {
         const double order = static_cast<double>(p.factors.size());
         for (Index r = 0; r < p.factors[0].cols(); ++r) {
             double log_mean = 0;
             for (const RowMatrix& f : p.factors) log_mean += std::log(f.col(r).norm()) / order;
             const double mean = std::exp(log_mean);
-            if (!(mean > 0)) continue;  // a component that is gone
+            if (!(mean > 0)) continue;  // a vanished component
             for (std::size_t k = 0; k < p.factors.size(); ++k) {
                 const double stretch = mean / p.factors[k].col(r).norm();
                 p.factors[k].col(r) *= stretch;
@@ -104,7 +105,8 @@ class NormalEquations {
 
     const Factors& gradient() const { return gradient_; }
 
-    /// The step for a shift (ridge + damping) of the diagonal; `residual_dot_step` is what conjugate gradients left.
+    /// The step for a shift (ridge + damping) of the diagonal; `residual_dot_step`: (residual of the conjugate
+    /// gradients) . step.
     Factors step(double shift, double& residual_dot_step) {
         shift_ = shift;
         inverse_.resize(order_);

@@ -1,4 +1,4 @@
-// Blocked MTTKRP: each block of the tensor meets a block of Khatri-Rao rows made on the spot, in one product.
+// Blocked MTTKRP: each block of the tensor is multiplied with a block of Khatri-Rao rows that is formed on the fly.
 // Phan, Tichavsky, Cichocki 2013, "Fast alternating LS algorithms ...", for the split into two sides.
 #include "tensor/mttkrp.hpp"
 
@@ -9,11 +9,11 @@ namespace medulla::tensor {
 
 namespace {
 
-// Block sizes: a tensor block of 64 x 256 doubles fills 128 KB of L2; fixed, since they fix the order of sums.
+// A tensor block of 64 x 256 doubles fills 128 KB of L2. Constants, since they decide the order of sums.
 constexpr Eigen::Index outputs_per_chunk = 64;
 constexpr Eigen::Index terms_per_block = 256;
 
-// Waking a team costs some 10 us, and far more where cores are shared: a few milliseconds of work must wait for it.
+// Starting a team of threads takes about 10 us, and far more on shared cores: only for a few milliseconds of work.
 bool worth_threads(Eigen::Index cells, Eigen::Index rank) { return cells * rank > (Eigen::Index{1} << 23); }
 
 }  // namespace
@@ -47,7 +47,7 @@ void khatri_rao_rows(const Factors& factors, std::size_t first, std::size_t last
 
 SplitTensor::SplitTensor(const double* values, std::vector<std::size_t> shape)
     : values_(values), shape_(std::move(shape)), split_(1) {
-    // The split whose two sides are nearest in size leaves least to do after the two large products.
+    // The split with sides of the most similar size leaves the least work after the two large products.
     double best = INFINITY, size = 0, before = 0;
     for (std::size_t n : shape_) size += std::log(static_cast<double>(n));
     for (std::size_t k = 1; k < shape_.size(); ++k) {

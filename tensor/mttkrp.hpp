@@ -1,5 +1,5 @@
-// The matricised tensor times Khatri-Rao product (MTTKRP): the one costly step of every CP solver, for all modes at
-// about the price of two. Rests on product.hpp and OpenMP; internal to this folder.
+// The matricised tensor times Khatri-Rao product (MTTKRP): the expensive step of every CP solver, for all modes at
+// about the cost of two. Internal to this folder.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@ using Factors = std::vector<RowMatrix>;
 
 /// A tensor seen as a matrix: modes [0, split) down, modes [split, order) across. Borrows the values.
 /// Products with the factors of one side serve every mode of the other side (a dimension tree of depth one).
-/// The Khatri-Rao product is met a block of rows at a time and never stored as a whole. Every entry is summed in an
-/// order fixed by the shape, so results do not depend on the number of threads.
+/// The Khatri-Rao product is formed block by block and never stored as a whole. Every entry is summed in an order fixed
+/// by the shape, so results do not depend on the number of threads.
 class SplitTensor {
   public:
     SplitTensor(const double* values, std::vector<std::size_t> shape);

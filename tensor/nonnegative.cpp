@@ -1,9 +1,8 @@
-// CP with every factor >= 0: coordinate descent column by column (HALS) with MTTKRPs taken on a HOSVD core.
+// CP with every factor >= 0: coordinate descent column by column (HALS), with MTTKRPs on a HOSVD core.
 // Cichocki & Phan 2009, "Fast local algorithms for large scale nonnegative matrix and tensor factorizations".
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include "tensor/als.hpp"
 #include "tensor/hosvd.hpp"
@@ -46,10 +45,10 @@ Fit hals_sweeps(const Hosvd& hosvd, double scale, Factors start, const CpOptions
             gram = Eigen::MatrixXd::Ones(rank, rank);
             for (std::size_t m = 0; m < order; ++m)
                 if (m != k) gram.array() *= grams[m].array();
-            for (int pass = 0; pass < 3; ++pass)  // cheap beside the MTTKRP
+            for (int pass = 0; pass < 3; ++pass)  // cheap compared with the MTTKRP
                 for (Eigen::Index r = 0; r < rank; ++r) {
                     const double curvature = gram(r, r) + ridge;
-                    if (!(curvature > 0)) continue;  // a component that is gone
+                    if (!(curvature > 0)) continue;  // a vanished component
                     factors[k].col(r) =
                         (factors[k].col(r) +
                          (right.col(r) - factors[k] * gram.col(r) - ridge * factors[k].col(r)) / curvature)
@@ -59,7 +58,7 @@ Fit hals_sweeps(const Hosvd& hosvd, double scale, Factors start, const CpOptions
             product = (right.array() * factors[k].array()).sum();
         }
         gram.array() *= grams[order - 1].array();
-        // Balanced columns keep the ridge at its least, and the Grams well scaled.
+        // Balanced columns minimise the ridge and keep the Gram matrices well scaled.
         for (Eigen::Index r = 0; r < rank; ++r) {
             double log_mean = 0;
             for (const RowMatrix& f : factors) log_mean += std::log(f.col(r).norm()) / static_cast<double>(order);
@@ -67,7 +66,7 @@ Fit hals_sweeps(const Hosvd& hosvd, double scale, Factors start, const CpOptions
                 for (RowMatrix& f : factors) f.col(r) *= std::exp(log_mean) / f.col(r).norm();
         }
         for (std::size_t k = 0; k < order; ++k) refresh(k);
-        // Components cannot cancel, so rounding stays near that of 1: below 1e-7 the difference is noise.
+        // Components cannot cancel, so terms are of order 1: below 1e-7 their difference is rounding.
         fit.error = std::sqrt(std::max(0.0, 1 - 2 * product + gram.sum()));
         fit.trace.push_back(fit.error);
         fit.iterations = sweep + 1;
@@ -100,41 +99,21 @@ CpResult cp_nonnegative(const Tensor& tensor, const CpOptions& options) {
     } else {
         const Hosvd hosvd = truncated_hosvd(input.tensor(), options.truncation.value_or(1e-4));
         const double core_norm = norm(hosvd.core);
-        Fit best;
-        for (int start = 0; start < options.restarts.value_or(1); ++start) {
+        Fit best = best_of(options.restarts.value_or(1), result.report, [&](int start) {
             Factors factors = gaussian_factors(tensor.shape, options.rank, options.seed, start);
             for (RowMatrix& f : factors) f = f.cwiseAbs();
-            Fit fit = hals_sweeps(hosvd, 1 / core_norm, std::move(factors), options);
-            result.report.starts.push_back(fit.error);
-            if (start == 0 || fit.error < best.error) best = std::move(fit);
-        }
+            return hals_sweeps(hosvd, 1 / core_norm, std::move(factors), options);
+        });
         best.weights *= core_norm / input.norm();
-        result.model = to_model(best, input);
-        result.report.iterations = best.iterations;
-        result.report.stop = best.stop;
-        result.report.trace = best.trace;
-        result.report.core = hosvd.core.shape;
+        store(best, input, hosvd.core.shape, result);
         result.report.truncation_error = hosvd.error;
-        // The discarded part is not orthogonal to nonnegative factors: measure.
+        // The discarded part is not orthogonal to nonnegative factors, so the error is evaluated explicitly.
         result.report.relative_error = relative_error(tensor, result.model);
-        result.report.degeneracy = degeneracy(result.model, input.restore(1));
     }
     result.report.solver = "nonnegative";
     result.report.ridge = options.ridge.value_or(0.0);
     result.report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     return result;
-}
-
-CpResult cp(const Tensor& tensor, Solver solver, const CpOptions& options) {
-    switch (solver) {
-        case Solver::als:
-            return cp_als_compressed(tensor, options);
-        case Solver::lm:
-            return cp_lm(tensor, options);
-        case Solver::nonnegative:
-            return cp_nonnegative(tensor, options);
-    }
-    throw std::invalid_argument("cp: no such solver");
 }
 
 }  // namespace medulla::tensor

@@ -1,13 +1,13 @@
-// The product, compiled once per instruction set; the best one the machine has runs.
+// The product, compiled once per instruction set; the best one of the machine is chosen at run time.
 // Tiles of six rows by up to four vectors stay in registers over the inner dimension: Goto & van de Geijn 2008,
-// "Anatomy of high-performance matrix multiplication". The matrices here fit the second cache, so rows of b are met in
-// place where they are contiguous.
+// "Anatomy of high-performance matrix multiplication". The matrices here fit the second-level cache, so contiguous rows
+// of b are used in place.
 #include "tensor/product.hpp"
 
 #include <algorithm>
 #include <vector>
 
-// Tiles are arrays of vectors, which vectors without a size cannot be in.
+// Tiles are arrays of vectors, which those of unknown size cannot be.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tensor/product.cpp"

@@ -1,5 +1,5 @@
-// Matrix products for the CP solvers: vectors as wide as the machine has, chosen at run time. Rests on Eigen for
-// storage and on Google Highway; internal to this folder.
+// Matrix products for the CP solvers, with the widest SIMD of the machine, chosen at run time. Eigen for storage and
+// Google Highway for SIMD; internal to this folder.
 #pragma once
 
 #include <Eigen/Dense>

@@ -1,5 +1,4 @@
-// Scaling, starts, small symmetric solves and the stop rule of the CP solvers.
-// Rests on solving.hpp.
+// Scaling, starts, small symmetric solves and the stopping rule of the CP solvers.
 #include "tensor/solving.hpp"
 
 #include <cmath>
@@ -39,7 +38,7 @@ Normalised::Normalised(const Tensor& tensor) : original_(tensor) {
     require_valid(tensor);
     const double largest = max_abs(tensor);
     if (largest == 0) return;
-    // Within 2^+-400 squares, and sums of 2^60 of them, stay in range: see norm().
+    // Up to 2^+-400, squares and sums of 2^60 of them stay in range: see norm().
     const int exponent = std::ilogb(largest);
     if (std::abs(exponent) > 400) {
         exponent_ = exponent;
@@ -58,8 +57,8 @@ Factors gaussian_factors(const std::vector<std::size_t>& shape, int rank, std::u
         for (Eigen::Index i = 0; i < factor.size(); ++i) {
             const std::uint64_t bits = mix(key + static_cast<std::uint64_t>(i));
             // Box & Muller 1958.
-            factor.data()[i] =
-                std::sqrt(-2 * std::log(uniform(bits))) * std::cos(6.283185307179586477 * uniform(mix(bits)));
+            factor.data()[i] = std::sqrt(-2 * std::log(uniform(bits))) *
+                               std::cos(2 * static_cast<double>(EIGEN_PI) * uniform(mix(bits)));
         }
         factors.push_back(std::move(factor));
     }
@@ -69,11 +68,11 @@ Factors gaussian_factors(const std::vector<std::size_t>& shape, int rank, std::u
 RowMatrix solve_gram(const Eigen::MatrixXd& gram, const RowMatrix& right) {
     const double epsilon = std::numeric_limits<double>::epsilon();
     const Eigen::VectorXd scale =
-        gram.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });  // 0: a dead component
+        gram.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });  // 0: a vanished component
     const Eigen::MatrixXd unit = scale.asDiagonal() * gram * scale.asDiagonal();
     Eigen::MatrixXd solution = scale.asDiagonal() * right.transpose();
     const Eigen::LLT<Eigen::MatrixXd> cholesky(unit);
-    // Below R eps the smallest eigenvalue is rounding of the largest, and a Cholesky solve would divide by it.
+    // Below rank * eps the smallest eigenvalue is rounding of the largest, and a Cholesky solve would divide by it.
     const double smallest = static_cast<double>(gram.rows()) * epsilon;
     if (cholesky.info() == Eigen::Success && cholesky.rcond() > smallest) {
         cholesky.solveInPlace(solution);

@@ -1,5 +1,5 @@
-// What the CP solvers share: the scaled input, Gaussian starts, small symmetric solves and the stop rule.
-// Rests on cp.hpp and mttkrp.hpp; internal to this folder.
+// Shared parts of the CP solvers: scaled input, Gaussian starts, small symmetric solves and the stopping rule.
+// Internal to this folder.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@ namespace medulla::tensor {
 /// Throws std::invalid_argument where an option is outside its range.
 void require_valid(const CpOptions& options);
 
-/// A valid tensor brought to where squares neither overflow nor underflow: by a power of two, and only where needed,
-/// so that in the common case nothing is copied.
+/// A valid tensor, scaled by a power of two such that squares neither overflow nor underflow. Copied only if that is
+/// necessary.
 class Normalised {
   public:
     explicit Normalised(const Tensor& tensor);  ///< throws as require_valid(tensor); borrows the tensor
@@ -36,14 +36,14 @@ Factors gaussian_factors(const std::vector<std::size_t>& shape, int rank, std::u
 /// or, where that is singular to rounding, the least-norm solution by eigenvalues.
 RowMatrix solve_gram(const Eigen::MatrixXd& gram, const RowMatrix& right);
 
-/// Norms of the columns; each column divided by its own. A zero column keeps its old direction: the one in `old`.
+/// Norms of the columns; each column divided by its own. A zero column keeps its direction of before, the one in `old`.
 Eigen::VectorXd normalise_columns(RowMatrix& factor, const RowMatrix& old);
 
 /// Stop::converged: the error fell by less than `tolerance` of itself over the last half of all sweeps, at least ten.
-/// A plateau must last as long as everything before it: a swamp, left after a while, does not pass for an end.
+/// A plateau must last as long as all sweeps before it, so that a temporary one (a swamp) does not end the solve.
 bool is_flat(const std::vector<double>& trace, double tolerance);
 
-/// Relative error that rounding alone leaves: each cell sums `rank` products of `order` factors whose magnitudes add
+/// Relative error from rounding alone: each cell sums `rank` products of `order` factors whose magnitudes add
 /// up to norm_ratio times the tensor's.
 double rounding_floor(std::size_t order, int rank, double norm_ratio);
 

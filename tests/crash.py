@@ -30,7 +30,7 @@ SMALL = AXES + ["--method", "analog", "--paths", "1500"]
 
 def clean_environment():
     """Launchers' variables would make a worker of every run."""
-    return {k: v for k, v in os.environ.items() if not k.startswith(("SLURM_", "OMPI_"))}
+    return {k: v for k, v in os.environ.items() if not k.startswith(("SLURM_", "OMPI_", "PMI", "PALS_", "MV2_", "MVP_", "FLUX_", "JSM_", "ALPS_"))}
 
 
 def sanitized():

@@ -1,6 +1,6 @@
-// What `furtable export --format glsl` writes, compiled as C++ with a small vec4 and held against the runtime: the same
-// sums in the same order give the same bits; only 1 - exp(-x) is another formula. Shaders take the signed contraction.
-// glsl_values ABSORBING.furpack
+// The output of `furtable export --format glsl`, compiled as C++ with a small vec4 and compared with the runtime: the
+// same sums in the same order give the same bits; only 1 - exp(-x) has another formula. Shaders use the signed
+// contraction. glsl_values ABSORBING.furpack
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -40,7 +40,7 @@ float uintBitsToFloat(uint bits) {
     return x;
 }
 
-// Instead of the embedded arrays, whose words tests/programs.py compares with the pack's.
+// In place of the embedded arrays, which tests/programs.py compares with the pack.
 #define BUILT_IN_WORD(i) word_of(medulla::default_pack_words, i)
 #define ABSORBING_WORD(i) word_of(absorbing.data(), i)
 #include "absorbing.glsl"
@@ -53,7 +53,7 @@ namespace {
 using namespace medulla;
 
 int failures = 0;
-double worst = 0;  // relative difference where another formula stands
+double worst = 0;  // relative difference where the formulas differ
 
 void same(const char* what, float expected, float found) {
     if (std::memcmp(&expected, &found, sizeof found) == 0 || (expected == 0 && found == 0)) return;
@@ -85,7 +85,7 @@ int main(int, char** argv) {
     };
     const int count = 20000;
     for (int i = 0; i < count; ++i) {
-        // Also beyond the axes, at their ends, and more than a turn around; every few on a node.
+        // Some outside the axes, at their ends, beyond a full turn, or on a node.
         const float sigma = i % 7 == 0 ? 0.0f : uniform(0, 20) * uniform(0, 1),
                     g = i % 11 == 0 ? 0.95f : uniform(-0.1f, 0.97f);
         const float h = i % 13 == 0 ? 1.0f : uniform(-1, 1), phi = uniform(-20, 20), absorption = uniform(0, 3);
@@ -116,6 +116,7 @@ int main(int, char** argv) {
         query.absorption = absorption;
         near("azimuthal, absorbing", of_disc(opened.pack), glsl::absorbing_azimuthal(sigma, g, h, phi, absorption));
     }
-    std::printf("%d queries, %d unlike the runtime; 1 - exp(-x) makes at most %.1e\n", count, failures, worst);
+    std::printf("%d queries, %d differ from the runtime; largest difference by 1 - exp(-x) %.1e\n", count, failures,
+                worst);
     return failures == 0 ? 0 : 1;
 }

@@ -171,7 +171,7 @@ class Hostile(unittest.TestCase):
         self.lie(lambda f: f.attrs.__setitem__("format", numpy.bytes_("other")), "format", seal=False)
         self.lie(lambda f: f.attrs.__delitem__("sha256"), "sha256", seal=False)
         self.lie(lambda f: f.attrs.__setitem__("sha256", numpy.bytes_("0" * 64)), "SHA-256", seal=False)
-        self.lie(lambda f: f.attrs.__setitem__("program", "text of any length"), "program", seal=False)
+        self.lie(lambda f: f.attrs.__setitem__("program", "x" * 65537), "program", "65536 bytes", seal=False)
         self.lie(lambda f: f["azimuthal"].attrs.__setitem__("seed", 1.5), "seed", seal=False)
 
     def test_declared_but_not_there(self):

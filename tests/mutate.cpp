@@ -1,6 +1,6 @@
-// mutate tables|pack COUNT [SEED]: reads COUNT mutated files. Counts crashes, hangs, silent differences (opens, and any
-// value differs), greed (one allocation above the limit) and numbers that are not finite; all of them must be 0. Tables
-// are read in subprocesses.
+// mutate tables|pack COUNT [SEED]: reads COUNT mutated files. Counts crashes, hangs, undetected changes (the file opens
+// and a value differs), allocations above the limit and numbers that are not finite; all counts must be 0. Tables are
+// read in subprocesses.
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -20,6 +20,7 @@
 #include "tables/pack/writer.hpp"
 #include "tables/store/file.hpp"
 #include "tables/store/tables_file.hpp"
+#include "tests/support/small_request.hpp"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define MEDULLA_WATCH 0
@@ -32,7 +33,7 @@
 #define MEDULLA_WATCH 1
 #endif
 
-// Every allocation of the process, the libraries' included, is seen: glibc lets a program replace its malloc.
+// Sees every allocation of the process and its libraries: glibc allows programs to replace malloc.
 namespace {
 std::size_t greatest_request = 0;
 void see(std::size_t size) {
@@ -57,18 +58,18 @@ using namespace medulla::tables;
 using Bytes = std::vector<unsigned char>;
 using Random = std::mt19937_64;
 
-// HDF5 takes 1 MiB for its chunk cache and page buffers whatever the file; the files here hold far less.
+// HDF5 always allocates 1 MiB for its chunk cache and page buffers; the files here are far smaller.
 constexpr std::size_t allowed_request = std::size_t{64} << 20;
 constexpr int seconds_of_a_hang = 20;
 
 std::size_t below(Random& random, std::size_t n) { return static_cast<std::size_t>(random() % n); }
 
-/// One of the ways a file goes wrong: bits, bytes, numbers, blocks, cuts, growth; up to four at once.
+/// One kind of damage: bits, bytes, numbers, blocks, truncation, growth; up to four at once.
 Bytes mutate(const Bytes& good, Random& random) {
     Bytes bytes = good;
     const std::size_t changes = 1 + (random() % 4 == 0 ? below(random, 4) : 0);
     for (std::size_t change = 0; change < changes && !bytes.empty(); ++change) {
-        // Structure lies near the start and is rare in a file of data: every second change is made there.
+        // Structure is near the start and a small part of the file: every second change is made there.
         const std::size_t reach = random() % 2 ? bytes.size() : std::min<std::size_t>(bytes.size(), 4096);
         const std::size_t at = below(random, reach), room = bytes.size() - at;
         const auto put = [&](std::uint64_t value, std::size_t size) {
@@ -174,13 +175,14 @@ Verdict judge(const std::string& path, const Bytes& good, const Bytes& bytes, co
     return refused ? Verdict::refused : same ? Verdict::same : Verdict::silent;
 }
 
-/// The mutation of number `i`: the same in whatever process and batch.
+/// The mutation of number `i`, independent of process and batch.
 Bytes mutation(const std::vector<Bytes>& files, std::uint64_t seed, std::uint64_t i) {
     Random random(seed * 0x9e3779b97f4a7c15u + i);
     return mutate(files[i % files.size()], random);
 }
 
-/// Reads mutations first .. last - 1 in a child; adds their verdicts. Returns the number of the first one not judged.
+/// Reads mutations first .. last - 1 in a child and adds their verdicts. @return number of the first one without
+/// verdict
 std::uint64_t run_batch(const std::vector<Bytes>& files, const Tables& expected, const std::string& path,
                         std::uint64_t seed, std::uint64_t first, std::uint64_t last, Counts& counts) {
     int ends[2];
@@ -239,15 +241,8 @@ std::uint64_t run_batch(const std::vector<Bytes>& files, const Tables& expected,
 }
 
 Request small_request() {
-    Request request = default_request();
-    request.sigma = graded_axis("sigma", {0, 4, 3});
-    request.g = graded_axis("g", {0, 0.6, 2});
-    request.h = graded_axis("h", {0, 1, 3});
-    request.theta_i = graded_axis("theta_i", {0, 1.2, 2});
+    Request request = test::small_request(Method::analog, {3, 2, 3, 2}, 36, 500);
     request.absorption = graded_axis("absorption", {0, 1, 2});
-    request.bins = 36;
-    request.paths = 500;
-    request.method = Method::analog;
     return request;
 }
 

@@ -259,7 +259,6 @@ class Programs(unittest.TestCase):
             self.fails(1, "furtable", *query, "--sigma", 4.5, "--g", 0.3, "--h", 0.1, names=["sigma", "4.5"])
             self.fails(1, "furtable", *query, "--sigma", 1, "--g", 0.7, "--h", 0.1, names=["g", "0.7"])
             self.fails(1, "furtable", *query, "--sigma", 1, "--g", 0.3, "--h", 1.1, names=["h", "1.1"])
-            self.fails(1, "furtable", *query, "--sigma", "nan", "--g", 0.3, "--h", 0.5, names=["sigma"])
             self.fails(1, "furtable", "query", file, "--table", "longitudinal", "--sigma", 1, "--g", 0.3, "--theta", 75,
                        names=["theta_i"])
 
@@ -327,7 +326,7 @@ class Programs(unittest.TestCase):
             self.assertEqual(status, 0, err)
             self.fails(1, "furtable", "query", other, "--table", "azimuthal", "--sigma", 2.1, "--g", 0.5, "--h", 0.2)
 
-    def test_info_verify_diff_plot_export(self):
+    def test_info_verify_diff_export(self):
         for file in ("t.h5", "t.furpack"):
             self.assertEqual(run("furtable", "verify", self.path(file))[0], 0)
             info = json.loads(run("furtable", "info", self.path(file), "--json")[1])
@@ -346,16 +345,64 @@ class Programs(unittest.TestCase):
         other = ["50" if word == "72" else word for word in SMALL]
         self.assertEqual(run("medulla-precompute", "-o", self.path("bins.h5"), *other)[0], 0)
         self.fails(1, "furtable", "diff", "t.h5", "bins.h5", names=["t.h5", "bins.h5", "72 bins", "50"])
-        for extension in ("svg", "html"):
-            picture = self.path("p." + extension)
-            self.assertEqual(run("furtable", "plot", self.path("t.h5"), self.path("t.furpack"), "-o", picture)[0], 0)
-            with open(picture) as f:
-                self.assertIn("<polyline", f.read())
         import numpy
         status, out, err = run("furtable", "export", self.path("t.h5"), "--format", "npy", "-o", self.path("a.npy"))
         self.assertEqual(status, 0, err)
         self.assertEqual(numpy.load(self.path("a.npy")).shape, (5, 3, 4, 72))
         self.assertEqual(run("furtable", "export", self.path("t.furpack"), "--format", "cpp", "-o", self.path("p.hpp"))[0], 0)
+
+    def test_plot(self):
+        """gnuplot draws: three formats, the same bytes twice, names and units, one line where something is missing."""
+        def plot(output, *words, **more):
+            return subprocess.run([os.path.join(BIN, "furtable"), "plot", *words, "-o", self.path(output)],
+                                  capture_output=True, text=True, errors="replace", cwd=self.folder.name, **more)
+
+        def bytes_of(name):
+            with open(self.path(name), "rb") as f:
+                return f.read()
+        for name in ("p.svg", "again.svg", "p.png", "p.html"):
+            done = plot(name, "t.h5", "t.furpack")
+            self.assertEqual((done.returncode, done.stderr), (0, ""), done)
+        self.assertEqual(bytes_of("p.svg"), bytes_of("again.svg"))
+        self.assertTrue(bytes_of("p.png").startswith(b"\x89PNG"))
+        self.assertTrue(bytes_of("p.html").startswith(b"<!DOCTYPE html>"))
+        self.assertNotIn(b"<?xml", bytes_of("p.html"))
+        import xml.etree.ElementTree
+        def texts(name):
+            found = ["".join(e.itertext()).strip() for e in xml.etree.ElementTree.parse(self.path(name)).iter()
+                     if e.tag.endswith("}text")]
+            return [" ".join(t.split()) for t in found if t]
+        found = texts("p.svg")
+        for text in ("azimuth φ [degrees]", "azimuthal lobe [1/rad]", "backward lobe [1/rad]", "forward lobe [1/rad]",
+                     "error [% of peak]", "t.furpack", "h = 0"):
+            self.assertIn(text, found)
+        # One file: no error, no legend of files. A pack alone, one node on every axis, and hostile names draw too.
+        self.assertEqual(plot("one.svg", "t.furpack").returncode, 0)
+        self.assertNotIn("error [% of peak]", texts("one.svg"))
+        single = ["--sigma-range", "2:2", "--g-range", "0.95:0.95", "--h-range", "0:0", "--theta-range", "0:0", "--bins",
+                  "8", "--method", "deterministic", "--progress", "none"]
+        name = os.fsdecode(b"o'ne_{x}\n`touch pwned`<b>&\xff.h5")
+        self.assertEqual(run("medulla-precompute", "-o", self.path("single.h5"), *single)[0], 0)
+        os.rename(self.path("single.h5"), self.path(name))
+        self.assertEqual(plot("single.svg", name, "default").returncode, 0)
+        self.assertEqual(texts("single.svg").count("σ = 2, g = 0.95"), 3)
+        self.assertIn("o'ne_{x}?`touch pwned`<b>&?.h5", texts("single.svg"))
+        self.assertFalse(os.path.exists(self.path("pwned")))
+        self.assertEqual(plot("at.svg", "t.h5", "--at", "1:0.6", "--at", "4:0").returncode, 0)
+        self.assertIn("σ = 4, g = 0", texts("at.svg"))
+        for at in ("1", "1:", "1:0.5:2", "x:1", "nan:0.5", ""):
+            self.fails(2, "furtable", "plot", "t.h5", "-o", "x.svg", "--at=" + at, names=["--at"])
+        # Without gnuplot, and with one that fails.
+        for path, words in (("/nonexistent", "gnuplot"), (self.path("bin"), "gnuplot failed: no luck")):
+            os.makedirs(self.path("bin"), exist_ok=True)
+            with open(self.path("bin/gnuplot"), "w") as f:
+                f.write("#!/bin/sh\necho no luck >&2\nexit 3\n")
+            os.chmod(self.path("bin/gnuplot"), 0o755)
+            done = plot("none.svg", "t.h5", env={**os.environ, "PATH": path})
+            self.assertEqual((done.returncode, done.stdout), (1, ""), done)
+            self.assertEqual(len(done.stderr.strip().splitlines()), 1, done.stderr)
+            self.assertIn(words, done.stderr)
+            self.assertFalse(os.path.exists(self.path("none.svg")))
 
     def test_glsl(self):
         """Its words are the pack's, and GLSL's own compiler takes it; tests/glsl_values.cpp compares its numbers."""

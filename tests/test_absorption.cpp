@@ -1,5 +1,5 @@
-// A medulla that absorbs, from tables to fibre: the fifth axis of C^N, what it leaves of the energies, packs that know
-// it, and the fibre that reads them (docs/physics.md, section 2; docs/bcsdf.md).
+// An absorbing medulla, from tables to fibre: the fifth axis of C^N, the energies it leaves, packs with that axis, and
+// fibres that use them (docs/physics.md, section 2; docs/bcsdf.md).
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
@@ -41,7 +41,7 @@ Tables simulated(Method method, bool absorbs) {
     return simulate(request, ProgressMode::none);
 }
 
-/// Both tables with the axis, without noise; and their pack.
+/// Noise-free versions of both tables with the axis, and their pack.
 const Tables& absorbing_tables() {
     static const Tables tables = simulated(Method::deterministic, true);
     return tables;
@@ -122,12 +122,11 @@ TEST_CASE("Survival lengths: closed form at sigma = 0, the limit at the rim, the
             INFO(table.describe(cell));
             if (at.absorption == 0) CHECK(lengths[cell] == table.mean_length[cell]);
             if (at.absorption == 0 || (at.sigma > 0 && at.h < 1)) continue;
-            // The share that is left where next to nothing is scattered: of collisions spread evenly over the chord, or
-            // of an all but grazing ray, where lengths turn as c log c, c = sqrt(1 - h^2).
+            // The share that is left where almost nothing is scattered: from collisions uniform on the chord, or of a
+            // nearly grazing ray, where lengths vary as c log c, c = sqrt(1 - h^2).
             const double h = std::min(at.h, 1 - 1e-14), sigma = std::max(at.sigma, 1e-9);
             const double left = solver.solve(sigma, at.absorption, {h}, 24)[0].energy / sim2d::disc_energy(sigma, h);
-            // Measured: 1.3e-3 and 2.2e-4 at the rim (the integral's error falls as nodes^-2 and faster), 2.8e-5
-            // inside.
+            // The errors here are 1.3e-3 and 2.2e-4 at the rim (they fall as nodes^-2 and faster) and 2.8e-5 inside.
             const double bound = at.h < 1 ? 1e-4 : (nodes == 4 ? 2e-3 : 4e-4);
             CHECK(std::abs(std::exp(-at.absorption * lengths[cell]) - left) < bound);
             if (at.h < 1) CHECK(lengths[cell] == Approx(-std::log(left) / at.absorption).epsilon(1e-3));
@@ -141,8 +140,7 @@ TEST_CASE("Survival lengths: closed form at sigma = 0, the limit at the rim, the
     }
 }
 
-TEST_CASE("Isotropic uniform light loses pi / 2 per unit of absorption: the stored mean lengths add up",
-          "[absorption]") {
+TEST_CASE("Stored mean lengths add up: isotropic uniform light loses pi / 2 per unit of absorption", "[absorption]") {
     // d energy / d absorption at 0 is -energy mean_length, whose integral over the offsets is pi / 2 less the
     // unscattered light's own (Blanco and Fournier 2003). Gauss-Legendre in asin h as the nodes of the axis.
     Request request = small_request(Method::deterministic);
@@ -167,12 +165,13 @@ TEST_CASE("Isotropic uniform light loses pi / 2 per unit of absorption: the stor
             lost += weight * ((table.energy[clear] - table.energy[dim]) / 1e-4 + through);
         }
         INFO(table.describe(row * 2 * request.h.size()));
-        CHECK(stored == Approx(pi / 2).epsilon(1e-3));  // the midpoint rule and the solver's energies
-        CHECK(lost == Approx(pi / 2).epsilon(1e-3));    // and half of 1e-4 times the mean square of a path
+        CHECK(stored == Approx(pi / 2).epsilon(1e-3));  // errors of the midpoint rule and of the solver's energies
+        CHECK(lost ==
+              Approx(pi / 2).epsilon(1e-3));  // and the quadratic term, 1e-4 / 2 times the mean square of a path
     }
 }
 
-TEST_CASE("A pack with the axis keeps lobes and survivals within the errors it reports", "[absorption][compress]") {
+TEST_CASE("A pack with the axis has lobes and survivals within the errors it reports", "[absorption][compress]") {
     const CompressResult& result = absorbing_pack();
     REQUIRE(result.errors[0].kind == TableKind::azimuthal);
     REQUIRE(result.errors[0].survival);
@@ -196,13 +195,14 @@ TEST_CASE("A pack with the axis keeps lobes and survivals within the errors it r
         const float density = float(whole * left) * lobe(lobes, contract(lobes, query), 0.4f);
         CHECK(azimuthal(pack, sigma, g, h, 0.4f, a) == Approx(density).epsilon(1e-5).margin(1e-7));
     }
-    // Beyond the axis the last length holds: less and less is left.
+    // Beyond the axis the length is clamped to its end: less and less is left.
     CHECK(survival(pack, 1, 0.3f, 0.2f, 20) < survival(pack, 1, 0.3f, 0.2f, 2));
     CHECK(std::isnan(survival(PackView{}, 1, 0.3f, 0.2f, 1)));
     CHECK(survival(PackView{}, 1, 0.3f, 0.2f, 0) == 1);
 }
 
-TEST_CASE("The fibre's scattered energies are the table's at the absorption of its medulla", "[absorption][bcsdf]") {
+TEST_CASE("The fibre's scattered energies are those of the table at the absorption of its medulla",
+          "[absorption][bcsdf]") {
     const CompressResult& result = absorbing_pack();
     const PackView pack = open_pack(result.pack.data(), result.pack.size()).pack;
     const Table& table = *absorbing_tables().azimuthal;
@@ -221,7 +221,7 @@ TEST_CASE("The fibre's scattered energies are the table's at the absorption of i
         INFO(table.describe(cell));
         const double passed = 1 - double(near.energy.A[0][0]);
         CHECK(std::abs(double(near.energy.A[3][0]) / passed - table.energy[cell]) < *result.errors[0].survival + 1e-5);
-        // Nothing is made: all lobes together stay within what is lit.
+        // No energy is created: all lobes together are at most the incident energy.
         float sum = 0;
         for (int lobe = 0; lobe < lobe_count; ++lobe) sum += near.energy.A[lobe][1];
         CHECK(sum <= 1.00001f);
@@ -266,7 +266,7 @@ FurParameters<3> absorbing_fur() {
 
 }  // namespace
 
-TEST_CASE("Near field with the axis: the plain twin, Eq. 20 without it, the clear medulla at sigma_ma = 0",
+TEST_CASE("Near field with the axis: reference implementation, Eq. 20 without it, clear medulla at sigma_ma = 0",
           "[absorption][bcsdf]") {
     const AbsorbingAnalyticPack knows, lobes_only(false);
     const analytic::AnalyticPack plain;
@@ -280,7 +280,7 @@ TEST_CASE("Near field with the axis: the plain twin, Eq. 20 without it, the clea
                     const LobeValues<3> found = near_lobes(fibre, theta_i, 0.2f, phi, h);
                     const reference::Lobes twin =
                         reference::near_lobes(p, *pack, double(theta_i), 0.2, double(phi), double(h));
-                    INFO("theta_i " << theta_i << " h " << h << " phi " << phi << " knows " << absorbs(*pack));
+                    INFO("theta_i " << theta_i << " h " << h << " phi " << phi << " axis " << absorbs(*pack));
                     for (int lobe = 3; lobe < lobe_count; ++lobe)
                         for (int c = 0; c < 3; ++c)
                             CHECK(found.N[lobe][c] == Approx(twin.N[lobe][c]).epsilon(2e-4).margin(1e-7));
@@ -292,16 +292,16 @@ TEST_CASE("Near field with the axis: the plain twin, Eq. 20 without it, the clea
     REQUIRE(prepare(p, plain.view, clear) == FurStatus::ok);
     for (const float h : {-0.8f, 0.2f}) {
         const LobeValues<3> a = near_lobes(absorbing, 0.4f, 0.1f, 1.0f, h), b = near_lobes(clear, 0.4f, 0.1f, 1.0f, h);
-        // Another axis rounds its factors otherwise.
+        // A different axis rounds its factors differently.
         for (int lobe = 0; lobe < lobe_count; ++lobe)
             CHECK(a.N[lobe][0] == Approx(b.N[lobe][0]).epsilon(2e-3).margin(1e-6));
     }
 }
 
-TEST_CASE("Unfolded tables with the axis: the factors' lobes, energies and far fields",
+TEST_CASE("Dense tables with the axis: lobes, energies and far fields of the factors",
           "[absorption][bcsdf][unfolded]") {
-    // Absorption goes with sigma, and sigma with theta_i. A real pack and the analytic one; the bound is that of
-    // unfolding without the axis.
+    // Absorption varies with sigma, and sigma with theta_i. A simulated pack and the analytic one; the bound is that of
+    // dense tables without the axis.
     const AbsorbingAnalyticPack analytic_pack;
     const OpenResult real = open_pack(absorbing_pack().pack.data(), absorbing_pack().pack.size());
     REQUIRE(real.status == PackStatus::ok);
@@ -329,7 +329,7 @@ TEST_CASE("Unfolded tables with the axis: the factors' lobes, energies and far f
                 }
             }
         CHECK(std::sqrt(difference / norm) < 1e-4);
-        // Neighbours of unlike light and offset in one batch.
+        // Independent queries in one batch.
         std::vector<float> theta_is, hs, theta_rs, phis;
         for (int i = 0; i < 97; ++i) {
             const float turn = 2.4f * float(i);
@@ -340,7 +340,7 @@ TEST_CASE("Unfolded tables with the axis: the factors' lobes, energies and far f
         eval(unfolded, 97, theta_is.data(), hs.data(), theta_rs.data(), phis.data(), batch.data());
         for (std::size_t i = 0; i < 97; ++i) {
             const Colour<3> one = eval(unfolded, theta_is[i], theta_rs[i], phis[i], hs[i]);
-            // An angle's 5e-7 over the narrowest lobe, 0.1, at four deviations.
+            // 5e-7 of an angle relative to the narrowest lobe, 0.1, at four standard deviations.
             CHECK(batch[i].value[1] == Approx(one.value[1]).epsilon(2e-5).margin(1e-9));
         }
         FarField<3> far, far_unfolded;
@@ -350,7 +350,7 @@ TEST_CASE("Unfolded tables with the axis: the factors' lobes, energies and far f
     }
 }
 
-TEST_CASE("Far field with the axis is the mean of near fields, and its samples weigh what it says",
+TEST_CASE("Far field with the axis is the mean of near fields, and sample weights average to its albedo",
           "[absorption][bcsdf]") {
     const AbsorbingAnalyticPack pack;
     FurFibre<3> fibre;
@@ -367,7 +367,7 @@ TEST_CASE("Far field with the axis is the mean of near fields, and its samples w
             }
             const LobeValues<3> found = far.lobes(0.1f, phi);
             INFO("theta_i " << theta_i << " phi " << phi);
-            // The far field's quadrature: 0.3 % of a lobe (docs/bcsdf.md).
+            // Error of the far field's quadrature: 0.3 % of a lobe (docs/bcsdf.md).
             for (int k = 0; k < 2; ++k) CHECK(double(found.N[k + 3][1]) == Approx(mean[k]).epsilon(3e-3).margin(1e-6));
         }
         // The mean weight of samples is the albedo; both from one set of random numbers, 5 standard errors.
@@ -389,8 +389,8 @@ TEST_CASE("Far field with the axis is the mean of near fields, and its samples w
         }
         const double mean = sum / samples, error = std::sqrt((squares / samples - mean * mean) / samples);
         CHECK(std::abs(mean - albedo) < 5 * error + 3e-3 * albedo);
-        // Near samples come from the lobe at its absorption: weights stay below the channels' number (docs/bcsdf.md),
-        // where the 2 % floor of another lobe's distribution would let them reach 50.
+        // Near samples are drawn from the lobe at the absorption: weights are at most the number of channels
+        // (docs/bcsdf.md); with the lobe at another absorption the 2 % floor of its distribution would allow 50.
         NearField<3> near;
         near_field(fibre, theta_i, 0.3f, near);
         NearSampler<3> drawn;

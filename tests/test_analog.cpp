@@ -1,4 +1,4 @@
-// The analog tracer against what is known in closed form (docs/physics.md, sections 2 to 4).
+// The analog tracer against closed forms (docs/physics.md, sections 2 to 4).
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdint>
@@ -73,7 +73,7 @@ TEST_CASE("Disc: at small sigma the lobe is the singly scattered one", "[analog]
         expected /= p.energy;
         const double probability = expected * width;
         const double noise = std::sqrt(probability * (1 - probability) / static_cast<double>(paths)) / width;
-        // Of the scattered light at most 1 - exp(-2 sigma) = 4 % is scattered again, anywhere.
+        // At most 1 - exp(-2 sigma) = 4 % of the scattered light is scattered again.
         CHECK(std::abs(p.lobe[b] - expected) < 5 * noise + 0.04 * p.lobe[b]);
     }
 }
@@ -97,13 +97,14 @@ TEST_CASE("Disc: mirror symmetry and the sigma -> 0 limit", "[analog]") {
     }
 }
 
-TEST_CASE("Slab: reciprocity, and which way theta_r points", "[analog]") {
+TEST_CASE("Slab: reciprocity, and the sign of theta_r", "[analog]") {
     const std::size_t bins = 12;
     const std::uint64_t paths = 400000;
     const double width = pi / bins, sigma = 1.2, g = 0.5;
     const auto centre = [&](std::size_t b) { return -pi / 2 + (static_cast<double>(b) + 0.5) * width; };
-    // cos(theta_i) raw(theta_i -> theta_r), both averaged over bins: light from the centre of a bin stands for the bin,
-    // with a curvature error of order width^2; 5 % covers it at these twelve bins away from grazing.
+    // cos(theta_i) raw(theta_i -> theta_r), both averaged over bins: light from the centre of a bin
+    // represents the bin, with a curvature error of order width^2: 5 % covers it for these twelve bins away from
+    // grazing.
     const std::size_t i = 4, r = 8;
     const SlabProfile there = trace_slab(sigma, g, centre(i), bins, options(paths, FirstCollision::forced, 1));
     const SlabProfile back = trace_slab(sigma, g, centre(r), bins, options(paths, FirstCollision::forced, 2));
@@ -112,7 +113,7 @@ TEST_CASE("Slab: reciprocity, and which way theta_r points", "[analog]") {
     const double noise = 5 * std::sqrt((a + b) / width / static_cast<double>(paths));
     CHECK(std::abs(a - b) < noise + 0.05 * a);
 
-    // Straight continuation is theta_r = -theta_i.
+    // Straight on is theta_r = -theta_i.
     const SlabProfile peaked = trace_slab(0.3, 0.8, 0.6, 36, options(paths, FirstCollision::forced, 3));
     const auto peak =
         std::max_element(peaked.forward.lobe.begin(), peaked.forward.lobe.end()) - peaked.forward.lobe.begin();
@@ -131,7 +132,7 @@ TEST_CASE("Mean path length under isotropic uniform illumination is pi / 2 for e
                 RandomStream random(5, cell, static_cast<std::uint64_t>(i));
                 // Isotropic uniform light on the circle: any point, the inward direction with density cos / 2.
                 const double s = 2 * random.uniform() - 1, c = std::sqrt((1 - s) * (1 + s));
-                const double length = walk_disc({-1, 0, {c, s}}, sigma, g, random).length;
+                const double length = follow_path({-1, 0, {c, s}}, sigma, g, random).length;
                 sum += length, squares += length * length;
             }
             const double mean = sum / paths, deviation = std::sqrt((squares / paths - mean * mean) / paths);
@@ -139,7 +140,7 @@ TEST_CASE("Mean path length under isotropic uniform illumination is pi / 2 for e
         }
 }
 
-TEST_CASE("Walks end and stay finite at the ends of every range", "[analog][stress]") {
+TEST_CASE("Paths end and stay finite at the ends of every range", "[analog][stress]") {
     std::uint64_t cell = 0;
     for (const double sigma : {0.0, 5e-324, 1e-300, 1e-8, 1.0, 1e3})
         for (const double g : {-0.99, 0.0, 0.999})
@@ -168,7 +169,7 @@ TEST_CASE("Walks end and stay finite at the ends of every range", "[analog][stre
                     for (const double x : side->lobe) CHECK((std::isfinite(x) && x >= 0));
             }
     const Profile one = trace_disc(1, 0.5, 0.2, 8, options(1, FirstCollision::forced));
-    CHECK(one.standard_error == 0);  // one count in one bin: the multinomial variance of a sure thing
+    CHECK(one.standard_error == 0);  // one count in one bin: its multinomial variance is 0
     const Profile none = trace_disc(0, 0.5, 0.2, 8, options(1000, FirstCollision::analog));
     CHECK((none.energy == 0 && none.lobe.empty()));
     CHECK_THROWS(trace_disc(-1, 0, 0, 8, {}));
@@ -178,8 +179,8 @@ TEST_CASE("Walks end and stay finite at the ends of every range", "[analog][stre
 }
 
 TEST_CASE("Random numbers do not repeat over 2^40 paths", "[analog][stress]") {
-    // Both ends of the 32 bits of a counter's word, the last path, and paths that differ in one bit only. 44 streams
-    // of 4096 numbers of 52 bits: two equal ones by chance once in 2.8 10^5 runs; here it is once and for all.
+    // Both ends of the 32 bits of a counter word, the last path, and paths that differ in one bit only. 44 streams of
+    // 4096 numbers of 52 bits: by chance two are equal once in 2.8 10^5 runs; the streams here are fixed.
     std::vector<std::uint64_t> paths{0, (1ull << 32) - 1, (1ull << 40) - 1, (1ull << 40) - 2};
     for (int bit = 0; bit < 40; ++bit) paths.push_back(1ull << bit);
     std::set<double> seen;
@@ -195,12 +196,12 @@ TEST_CASE("Random numbers do not repeat over 2^40 paths", "[analog][stress]") {
     CHECK(static_cast<double>(seen.size()) == n);
     CHECK(std::abs(sum / n - 0.5) < 5 * std::sqrt(1 / 12.0 / n));
     CHECK(std::abs(squares / n - 1 / 3.0) < 5 * std::sqrt(4 / 45.0 / n));
-    // Walks of the last paths end like those of the first: mean number of scatterings, 2 x 3000 walks, 5 errors.
+    // The last paths end like the first: mean number of collisions of 2 x 3000 paths, 5 standard errors.
     double count[2] = {0, 0}, square = 0;
     for (std::uint64_t i = 0; i < 3000; ++i)
         for (const int end : {0, 1}) {
             RandomStream random(11, 5, end ? (1ull << 40) - 1 - i : i);
-            const auto c = static_cast<double>(walk_disc({-1, 0, {1, 0}}, 20, 0.5, random).scatterings);
+            const auto c = static_cast<double>(follow_path({-1, 0, {1, 0}}, 20, 0.5, random).scatterings);
             count[end] += c / 3000, square += c * c / 6000;
         }
     CHECK(count[0] != count[1]);

@@ -1,4 +1,4 @@
-// The axis type, its mapping pair and its splines, as the runtime and the offline programs share them.
+// The axis type, its mapping pair and its splines, shared by the runtime and the offline programs.
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -10,7 +10,7 @@
 using namespace medulla;
 using namespace medulla::tables;
 
-TEST_CASE("locate and position are each other's inverse, and ends are held", "[axis]") {
+TEST_CASE("locate and position are inverse, and values outside are clamped", "[axis]") {
     const Spline open({0, 0.1, 0.5, 2, 3.5});
     for (double x = 0; x <= 3.5; x += 0.01) {
         const Cell<double> cell = locate(open.view(), x);
@@ -46,17 +46,17 @@ TEST_CASE("A spline through nodes reproduces its nodes, and polynomials of its d
         for (std::size_t i = 0; i < nodes.size(); ++i) values[static_cast<Eigen::Index>(i)] = f(nodes[i]);
         const Eigen::VectorXd coefficients = spline.from_nodes() * values;
         for (double x = nodes.front(); x <= nodes.back(); x += 0.05)
-            // Knots are rounded to float, so a node lies 2^-24 off its knot; the polynomial itself is exact.
+            // Knots are rounded to float, so a node differs from its knot by 2^-24; the polynomial itself is exact.
             CHECK(spline.basis(x).dot(coefficients) == Approx(f(x)).margin(1e-6));
     }
 }
 
-TEST_CASE("Mirrored splines are even or odd about their ends, and reach every such cubic spline", "[axis]") {
+TEST_CASE("Mirrored splines are even or odd about their ends, and include every such cubic spline", "[axis]") {
     const Spline spline({0, 0.1, 0.5, 1.2, 2});
     for (const Mirror mirror : {Mirror::even, Mirror::odd})
         for (const bool both : {false, true}) {
             const Eigen::MatrixXd free = spline.mirrored(mirror, both);
-            // A cubic spline has two derivatives: one condition at an even end, two at an odd one.
+            // Continuity of two derivatives gives one condition at an even end and two at an odd one.
             CHECK(free.cols() == spline.size() - (mirror == Mirror::even ? 1 : 2) * (both ? 2 : 1));
             const Eigen::VectorXd c = free * Eigen::VectorXd::LinSpaced(free.cols(), 1, -2);
             const auto f = [&](double x) { return spline.basis(x).dot(c); };
@@ -102,7 +102,7 @@ TEST_CASE("Bin averages of a spline are its exact averages", "[axis]") {
     CHECK(averages.mean() * 6 == Approx(spline.integrals().dot(c)).epsilon(1e-12));
 }
 
-TEST_CASE("The spline coordinate of h is tan(asin(h) / 2) to the last digits at h = 1", "[axis]") {
+TEST_CASE("The spline coordinate of h is tan(asin(h) / 2), accurate at h = 1", "[axis]") {
     for (const double h : {0.0, 1e-300, 0.3, 0.9, 1 - 1e-7, 1.0}) {
         const double c = spline_coordinate(Quantity::h, h);
         CHECK(c == Approx(std::tan(std::asin(h) / 2)).epsilon(1e-8));  // asin loses half its digits at 1
@@ -110,17 +110,17 @@ TEST_CASE("The spline coordinate of h is tan(asin(h) / 2) to the last digits at 
     }
 }
 
-TEST_CASE("Every spline coordinate has its inverse, and holds where rounding leaves the axis", "[axis]") {
+TEST_CASE("Every spline coordinate has its inverse, and is finite where rounding leaves the axis", "[axis]") {
     for (const Quantity q : {Quantity::sigma, Quantity::g, Quantity::h, Quantity::theta_i})
         for (const double x : {0.0, 1e-12, 0.25, 0.999, 1.0}) {
             CHECK(from_spline_coordinate(q, spline_coordinate(q, x)) == Approx(x).epsilon(1e-14));
             if (x > 0) CHECK(spline_coordinate(q, x) > spline_coordinate(q, 0.9 * x));
         }
     CHECK(spline_coordinate(Quantity::theta_i, float(pi / 2)) >= 0.999999f);  // float(pi/2) lies above pi/2
-    CHECK(spline_coordinate(Quantity::theta_i, 1.6f) > 1);                    // beyond the end, whose value holds
+    CHECK(spline_coordinate(Quantity::theta_i, 1.6f) > 1);                    // beyond the end: clamped later
 }
 
-TEST_CASE("Ranges: what is read and what is refused", "[axis]") {
+TEST_CASE("Ranges: accepted and refused text", "[axis]") {
     CHECK(parse_range("0:16:24", "--x", 3).count == 24);
     CHECK(parse_range("0:16", "--x", 3).count == 3);
     CHECK(parse_range("2:2:1", "--x", 3).count == 1);

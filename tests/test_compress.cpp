@@ -1,4 +1,4 @@
-// Compression end to end: packs keep the errors they report, sizes and errors asked for are met, lobes mirror.
+// Compression end to end: packs have the errors they report, requested sizes and errors are met, lobes are symmetric.
 #include <catch2/catch.hpp>
 #include <cmath>
 
@@ -14,7 +14,7 @@ using namespace medulla::tables;
 
 namespace {
 
-/// Both tables without noise, small but with the default's ranges.
+/// Small noise-free versions of both tables.
 const Tables& small_tables() {
     static const Tables tables = [] {
         Request request = default_request();
@@ -41,7 +41,7 @@ struct Opened {
 
 }  // namespace
 
-TEST_CASE("A pack of a table is the table within the error it reports", "[compress]") {
+TEST_CASE("A pack reproduces its table within the error it reports", "[compress]") {
     CompressOptions options;
     options.rank = 8;
     const CompressResult result = compress(small_tables(), options, "test");
@@ -52,14 +52,14 @@ TEST_CASE("A pack of a table is the table within the error it reports", "[compre
         CHECK(errors[i].relative == result.errors[i].relative);
         CHECK(errors[i].relative < 0.1);
         CHECK(errors[i].least >= 0);
-        // Normalisation and rounding move the factors' own error only a little.
+        // Normalisation and rounding change the error of the factors only a little.
         CHECK(errors[i].relative < 1.5 * result.tables[i].fit_error + 1e-3);
     }
     const CompressResult again = compress(small_tables(), options, "test");
     CHECK(again.pack == result.pack);
 }
 
-TEST_CASE("Bytes and errors that are asked for are met, and more bytes are never worse by much", "[compress]") {
+TEST_CASE("Requested bytes and errors are met, and more bytes are never much worse", "[compress]") {
     CompressOptions options;
     double before = 1;
     for (const std::size_t bytes : {20000, 32000}) {
@@ -80,7 +80,7 @@ TEST_CASE("Bytes and errors that are asked for are met, and more bytes are never
         for (const TableReport& table : compress(small_tables(), options, "test").tables)
             if (table.kind != TableKind::back_fraction) CHECK(table.fit_error <= error);
     }
-    options.max_error = 1e-9;  // the exit splines alone leave more
+    options.max_error = 1e-9;  // below the error of the exit splines
     CHECK_THROWS_AS(compress(small_tables(), options, "test"), Error);
 }
 
@@ -88,7 +88,7 @@ TEST_CASE("Lobes are continuous where h and theta_i change sign", "[compress]") 
     CompressOptions options;
     const Opened pack(compress(small_tables(), options, "test").pack);
     for (float y = -1.5f; y < 1.6f; y += 0.1f) {
-        // Odd factors vanish at 0: what is left there is the float rounding of a few coefficients, 1e-6.
+        // Odd factors vanish at 0, up to the float rounding of a few coefficients, 1e-6.
         CHECK(azimuthal(pack.view, 2, 0.5f, 0, y) == Approx(azimuthal(pack.view, 2, 0.5f, 0, -y)).epsilon(1e-5));
         CHECK(azimuthal(pack.view, 2, 0.5f, 1e-30f, y) == azimuthal(pack.view, 2, 0.5f, -1e-30f, -y));
         for (const Side side : {Side::back, Side::forward})
@@ -97,7 +97,7 @@ TEST_CASE("Lobes are continuous where h and theta_i change sign", "[compress]") 
     }
 }
 
-TEST_CASE("Non-negative factors: every component is a density between the nodes too", "[compress]") {
+TEST_CASE("Non-negative factors: every component is a density, also between the nodes", "[compress]") {
     CompressOptions options;
     options.solver = tensor::Solver::nonnegative;
     options.rank = 10;
@@ -122,7 +122,7 @@ TEST_CASE("Non-negative factors: every component is a density between the nodes 
             for (std::uint32_t j = 0; j < table.layout.axes[exit].spans + 3; ++j) {
                 const double even = scale(r) * table.number(exit, j, r);
                 const double odd = scale(middle + r) * table.number(exit, j, middle + r);
-                // Half a unit of each, and float.
+                // Rounding: half a unit of each, plus float.
                 CHECK(even - std::abs(odd) >= -0.51 * (unit(r) + unit(middle + r)));
             }
         }
@@ -130,9 +130,9 @@ TEST_CASE("Non-negative factors: every component is a density between the nodes 
     for (const LobeError& error : result.errors) CHECK(error.relative < 0.4);
 }
 
-TEST_CASE("A lobe integrates to 1 to float precision, its dips counted", "[compress]") {
+TEST_CASE("A clamped lobe integrates to 1 to float precision, negative undershoot included", "[compress]") {
     CompressOptions options;
-    options.rank = 4;  // coarse: it dips a lot
+    options.rank = 4;  // coarse: large negative undershoot
     const Opened coarse(compress(small_tables(), options, "test").pack);
     const OpenResult opened = open_pack(default_pack_words, default_pack_size);
     REQUIRE(opened.status == PackStatus::ok);
@@ -146,7 +146,8 @@ TEST_CASE("A lobe integrates to 1 to float precision, its dips counted", "[compr
                 query.sigma = 4 * u * u, query.g = 0.7f * (1 - std::abs(2 * u - 1)), query.h = u,
                 query.theta_i = 1.5f * u;
                 const Contraction contraction = contract(table, query);
-                // Simpson's rule on 64 parts of every span: a kink at a dip's end is off by its slope / 64^2.
+                // Simpson's rule on 64 parts of every span; its error at a kink, where clamping starts, is slope /
+                // 64^2.
                 const AxisView<float> axis = table.axis(table.parameter_axes());
                 double integral = 0, least = 0;
                 for (std::uint32_t span = 0; span < axis.spans; ++span) {
@@ -165,18 +166,18 @@ TEST_CASE("A lobe integrates to 1 to float precision, its dips counted", "[compr
                 deepest = std::min(deepest, least);
                 worst = std::max(worst, std::abs(integral - 1));
             }
-    CHECK(deepest < -1e-3);  // there was something to hold
-    CHECK(worst < 5e-6);     // float sums of up to 400 components that cancel up to tenfold
+    CHECK(deepest < -1e-3);  // there was something to clamp
+    CHECK(worst < 5e-6);     // float sums of up to 400 components with cancellation of up to a factor of ten
 }
 
-TEST_CASE("Degeneracy is found again from a pack's bytes", "[compress]") {
+TEST_CASE("Degeneracy from a pack's bytes agrees with the solver's", "[compress]") {
     CompressOptions options;
     options.rank = 8;
     const CompressResult result = compress(small_tables(), options, "test");
     REQUIRE(result.degeneracy.size() == 4);
     for (std::size_t i = 0; i < 3; ++i) {
-        // Even and odd components are orthogonal, and the solver worked in the same inner product but for bins and
-        // the rounding of blocks.
+        // Even and odd components are orthogonal, and the solver's inner product is the same up to bins and the
+        // rounding of blocks.
         double sum = 0, least = 1;
         for (std::size_t p = 0; p < result.tables[i].parts.size(); ++p) {
             const PartReport& part = result.tables[i].parts[p];
@@ -199,6 +200,6 @@ TEST_CASE("No error is claimed below the noise of the table", "[compress]") {
     CHECK(result.errors[0].noise == Approx(0.05).epsilon(1e-12));
     CHECK(result.errors[0].claim > 0.05);
     CHECK(result.errors[0].worst_claim >= result.errors[0].claim);
-    // The pack carries the noise along.
+    // The pack stores the noise.
     CHECK(pack_source(result.pack, "test")->noise(TableKind::azimuthal, {}) == Approx(0.05).epsilon(1e-6));
 }

@@ -1,4 +1,4 @@
-// CP models and plain ALS: what a solve must return whatever the tensor. Rests on tensor/ alone.
+// CP models and plain ALS: properties of every solve, for any tensor.
 #include <omp.h>
 
 #include <catch2/catch.hpp>
@@ -47,7 +47,7 @@ const std::vector<std::vector<std::size_t>> shapes = {{9}, {7, 70}, {5, 6, 7}, {
 
 }  // namespace
 
-TEST_CASE("a tensor knows its cells and its norm at any scale", "[tensor]") {
+TEST_CASE("cells and norm of a tensor at any scale", "[tensor]") {
     Tensor t({2, 3, 4});
     CHECK(t.size() == 24);
     t({1, 2, 3}) = 5;
@@ -95,13 +95,13 @@ TEST_CASE("expand is the sum of outer products, and the MTTKRP its gradient", "[
             const double n = static_cast<double>(x.size() / shape[k]);
             CHECK(((fast - slow).cwiseAbs().array() <= 2 * n * eps * magnitude.array()).all());
         }
-        const double explicit_squared =
-            split.residual_squared(factors, Eigen::VectorXd::Zero(3), 1.0);  // the model 0 leaves the tensor
+        const double explicit_squared = split.residual_squared(factors, Eigen::VectorXd::Zero(3),
+                                                               1.0);  // of the zero model: the norm of the tensor
         CHECK(std::sqrt(explicit_squared) == Approx(norm(x)).epsilon(1e-13));
     }
 }
 
-TEST_CASE("canonical form: unit columns, weights down, signs by rule, same tensor", "[cp]") {
+TEST_CASE("canonical form: unit columns, descending weights, signs by rule, same tensor", "[cp]") {
     CpModel model = random_model({5, 4, 6}, 4, 3);
     model.weights << -2, 3, 0, -1;
     const Tensor before = expand(model);
@@ -151,7 +151,7 @@ TEST_CASE("ALS recovers a synthetic rank-5 tensor to 1e-10 for orders 2 to 5", "
     }
 }
 
-TEST_CASE("ALS: the error never rises and the report tells the truth", "[cp][als]") {
+TEST_CASE("ALS: the error never rises and the report is correct", "[cp][als]") {
     Tensor x = expand(random_model({8, 9, 10, 11}, 12, 8));
     std::mt19937_64 bits(9);
     std::normal_distribution<double> normal;
@@ -164,7 +164,7 @@ TEST_CASE("ALS: the error never rises and the report tells the truth", "[cp][als
         const CpResult result = cp_als(x, options);
         CHECK(result.report.relative_error == Approx(relative_error(x, result.model)).epsilon(1e-8));
         CHECK(result.report.trace.back() == result.report.relative_error);
-        // With a ridge the sum of error and penalty falls; the penalty may trade up to itself for error.
+        // With a ridge the sum of error and penalty falls; the error may rise by at most the penalty.
         const double slack = ridge == 0 ? 1e-12 : ridge * 4 * 10;
         for (std::size_t i = 1; i < result.report.trace.size(); ++i)
             CHECK(result.report.trace[i] <= result.report.trace[i - 1] + slack);
@@ -173,7 +173,7 @@ TEST_CASE("ALS: the error never rises and the report tells the truth", "[cp][als
     }
 }
 
-TEST_CASE("same bytes for 1, 2 and 5 threads, other seeds are other starts", "[cp][als]") {
+TEST_CASE("same bytes for 1, 2 and 5 threads, different starts for different seeds", "[cp][als]") {
     Tensor x = expand(random_model({20, 9, 10, 110}, 6, 8));
     CpOptions options;
     options.rank = 4;
@@ -194,7 +194,7 @@ TEST_CASE("same bytes for 1, 2 and 5 threads, other seeds are other starts", "[c
     CHECK(cp_als(x, options).model.weights != results[0].model.weights);
 }
 
-TEST_CASE("input that is no tensor and options out of range are refused by name", "[cp]") {
+TEST_CASE("invalid tensors and options out of range are refused by name", "[cp]") {
     Tensor x = expand(random_model({3, 4, 5}, 2, 1));
     x({2, 0, 4}) = std::nan("");
     CHECK_THROWS_WITH(cp_als(x, {}), Catch::Contains("[2, 0, 4]") && Catch::Contains("not a number"));

@@ -1,5 +1,4 @@
-// Tensors that break CP solvers, and what every solver here must still promise. Rests on tensor/ and
-// bench/stand_in.hpp.
+// Tensors that break CP solvers, and properties that must hold for every solver.
 #include <omp.h>
 
 #include <catch2/catch.hpp>
@@ -45,7 +44,7 @@ Tensor low_rank(const std::vector<std::size_t>& shape, int rank, unsigned seed, 
     return expand(model);
 }
 
-/// What holds of any result: finite, canonical, and an error that is the model's own.
+/// Checks any result: finite, canonical, with the error of its model.
 void check_whole(const Tensor& x, const CpResult& result, int rank) {
     CAPTURE(summary(result.report));
     REQUIRE(result.model.rank() == rank);
@@ -55,18 +54,18 @@ void check_whole(const Tensor& x, const CpResult& result, int rank) {
     for (int r = 0; r + 1 < rank; ++r) CHECK(result.model.weights[r] >= result.model.weights[r + 1]);
     for (const auto& f : result.model.factors) {
         CHECK(f.allFinite());
-        // A length is a sum of up to 720 squares, each with its rounding.
+        // A length is a sum of up to 720 rounded squares.
         CHECK((f.colwise().norm().array() - 1).abs().maxCoeff() < 720 * eps);
     }
-    // e^2 by the identity has rounding of a few eps (1 + norm_ratio^2), held below 1e-5 e^2 or subtracted cell by cell;
-    // what the HOSVD discarded is known to 1e-8, and matters from 1e-5 up.
+    // e^2 from the identity has rounding of a few eps (1 + norm_ratio^2), which is below 1e-5 e^2, or else subtracted
+    // cell by cell. The discarded part of the HOSVD is known to 1e-8 and matters from 1e-5 up.
     const double truth = relative_error(x, result.model);
     CHECK(result.report.relative_error == Approx(truth).epsilon(1e-4).margin(1e-13));
 }
 
 }  // namespace
 
-TEST_CASE("HOSVD keeps the error asked for, with orthonormal bases, at every order", "[hosvd]") {
+TEST_CASE("HOSVD has at most the requested error, with orthonormal bases, at every order", "[hosvd]") {
     for (const std::vector<std::size_t>& shape : std::vector<std::vector<std::size_t>>{
              {50}, {300}, {20, 90}, {90, 20}, {9, 100, 11}, {6, 7, 8, 150}, {4, 5, 6, 5, 4}, {1, 7, 1, 80}}) {
         Tensor x = low_rank(shape, 4, 2);
@@ -86,12 +85,12 @@ TEST_CASE("HOSVD keeps the error asked for, with orthonormal bases, at every ord
             const double error = norm(back) / norm(x);
             CAPTURE(shape.size(), bound, h.error);
             CHECK(error <= std::max(bound, finest_truncation) * (1 + 1e-6));
-            CHECK(error == Approx(h.error).epsilon(1e-6).margin(3e-8));  // 3e-8: sqrt(eps) and a little, see hosvd.hpp
+            CHECK(error == Approx(h.error).epsilon(1e-6).margin(3e-8));  // 3e-8: about sqrt(eps), see hosvd.hpp
         }
     }
 }
 
-TEST_CASE("the fast solvers too recover exactly low-rank tensors to 1e-10, over-ranked ones included", "[cp][stress]") {
+TEST_CASE("the fast solvers recover low-rank tensors to 1e-10, also at a higher rank", "[cp][stress]") {
     const Tensor x = low_rank({9, 8, 7, 70}, 5, 4);
     for (const Named& s : solvers)
         for (int rank : {5, 8}) {
@@ -145,8 +144,8 @@ TEST_CASE("zero tensor, zero slices, duplicate slices", "[cp][stress]") {
         options.max_sweeps = 300;
         const CpResult result = s.solve(x, options);
         check_whole(x, result, 3);
-        // A zero slice gets rows of zero, a duplicate the same rows: what is left of either is rounding of a solve
-        // whose Grams have condition numbers up to 1e6 here, times the truncation where there is one.
+        // A zero slice gets zero rows, a duplicate slice equal rows, up to the rounding of a solve whose Gram matrices
+        // have condition numbers up to 1e6 here, times the truncation where there is one.
         const Eigen::MatrixXd& f = result.model.factors[0];
         CHECK(f.row(2).norm() < 1e-6);
         CHECK((f.row(4) - f.row(1)).norm() < 1e-6);
@@ -163,7 +162,7 @@ TEST_CASE("scales from 1e-170 to 1e170 give the same model, scaled", "[cp][stres
         for (int exponent : {-1000, -565, 565, 1000}) {  // 1e170 = 2^565
             const CpResult other = s.solve(scaled(x, exponent), options);
             CAPTURE(s.name, exponent);
-            // A power of two is exact, and the path taken differs in nothing but it.
+            // A power of two is exact and changes nothing else.
             CHECK(other.report.relative_error == Approx(plain.report.relative_error).epsilon(1e-12));
             for (int r = 0; r < 4; ++r)
                 CHECK(std::ldexp(other.model.weights[r], -exponent) == Approx(plain.model.weights[r]).epsilon(1e-9));
@@ -176,8 +175,8 @@ TEST_CASE("scales from 1e-170 to 1e170 give the same model, scaled", "[cp][stres
     }
 }
 
-TEST_CASE("a border-rank tensor: plain ALS diverges and says so, a ridge bounds it", "[cp][stress]") {
-    // de Silva & Lim 2008: a a b + a b a + b a a has rank 3, and rank-2 models come as near as they like by cancelling.
+TEST_CASE("a border-rank tensor: plain ALS diverges and reports it, a ridge bounds it", "[cp][stress]") {
+    // de Silva & Lim 2008: a a b + a b a + b a a has rank 3, and rank-2 models come arbitrarily close by cancellation.
     Tensor x({2, 2, 2});
     x({0, 0, 1}) = x({0, 1, 0}) = x({1, 0, 0}) = 1;
     CpOptions options;
@@ -192,18 +191,18 @@ TEST_CASE("a border-rank tensor: plain ALS diverges and says so, a ridge bounds 
     CHECK_THAT(summary(plain.report), Catch::Contains("degenerate"));
     for (const Named& s : solvers) {
         options.ridge = 1e-3;
-        const CpResult held = s.solve(x, options);
-        CAPTURE(s.name, summary(held.report));
-        // F <= 1/2 at the zero model bounds |model|: sum of ridge |factor|^2 <= 1 allows weights up to (1e3/3)^1.5, but
-        // the minimum sits where penalty and error balance.
-        CHECK_FALSE(held.report.degenerate());
-        CHECK(held.report.relative_error < 0.2);
+        const CpResult bounded = s.solve(x, options);
+        CAPTURE(s.name, summary(bounded.report));
+        // F <= 1/2 at the zero model bounds the model: sum of ridge |factor|^2 <= 1 allows weights up to (1e3/3)^1.5.
+        // The minimum is where penalty and error balance.
+        CHECK_FALSE(bounded.report.degenerate());
+        CHECK(bounded.report.relative_error < 0.2);
     }
     options.ridge.reset();
     CHECK_FALSE(cp_lm(x, options).report.degenerate());
 }
 
-TEST_CASE("heavy noise: no solver fits worse than nothing, no error rises", "[cp][stress]") {
+TEST_CASE("heavy noise: no solver is worse than the zero model, no error rises", "[cp][stress]") {
     Tensor x = low_rank({8, 9, 10, 30}, 3, 9);
     const Tensor noise = random_tensor(x.shape, 10);
     const double level = 3 * norm(x) / norm(noise);
@@ -216,15 +215,15 @@ TEST_CASE("heavy noise: no solver fits worse than nothing, no error rises", "[cp
         CAPTURE(s.name);
         check_whole(x, result, 8);
         CHECK(result.report.relative_error < 1);
-        // Sweeps without a ridge lower the error itself; LM lowers error plus penalty, 1e-5 times a sum of squares
-        // that is 4 sum w^(1/2) < 4 * 8 for weights below 1.
+        // Sweeps without a ridge lower the error itself; LM lowers error plus penalty, which is 1e-5 times a sum of
+        // squares, 4 sum w^(1/2) < 4 * 8 for weights below 1.
         const double slack = s.solve == cp_lm ? 1e-5 * 32 : 1e-12;
         for (std::size_t i = 1; i < result.report.trace.size(); ++i)
             CHECK(result.report.trace[i] <= result.report.trace[i - 1] + slack);
     }
 }
 
-TEST_CASE("a cell that is no number is refused by every solver, by its index", "[cp][stress]") {
+TEST_CASE("every solver refuses a cell that is not finite, with its index", "[cp][stress]") {
     Tensor x = low_rank({5, 4, 6}, 2, 12);
     for (const Named& s : all_solvers)
         for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
@@ -235,8 +234,8 @@ TEST_CASE("a cell that is no number is refused by every solver, by its index", "
         }
 }
 
-TEST_CASE("a swamp is not taken for the end", "[cp][stress]") {
-    // Nearly collinear factors: ALS crawls for hundreds of sweeps at a nearly constant error before it gets through.
+TEST_CASE("a temporary plateau (swamp) does not end ALS", "[cp][stress]") {
+    // Nearly collinear factors: ALS stays at a nearly constant error for hundreds of sweeps before it converges.
     std::mt19937_64 bits(3);
     std::normal_distribution<double> normal;
     CpModel model;
@@ -259,14 +258,14 @@ TEST_CASE("a swamp is not taken for the end", "[cp][stress]") {
         CHECK(through.report.relative_error < 1e-10);
     }
     const CpResult result = cp_als(x, options);
-    // The plateau is real: at some sweep past the 20th the error fell by less than 1 % over ten sweeps.
+    // There is a plateau: at some sweep after the 20th the error fell by less than 1 % over ten sweeps.
     const auto& t = result.report.trace;
     bool plateau = false;
     for (std::size_t i = 20; i + 10 < t.size(); ++i) plateau |= t[i] > 1e-6 && t[i + 10] > 0.99 * t[i];
     CHECK(plateau);
 }
 
-TEST_CASE("nonnegative: every factor is, and a nonnegative tensor is found again", "[cp][stress]") {
+TEST_CASE("nonnegative: every factor is >= 0, and a nonnegative tensor is recovered", "[cp][stress]") {
     std::mt19937_64 bits(4);
     std::exponential_distribution<double> positive;
     CpModel model;

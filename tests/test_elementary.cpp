@@ -1,4 +1,4 @@
-// The portable elementary functions against long double's: how far off, over all they are asked, and at their ends.
+// Errors of the portable elementary functions against those of long double, over their ranges and at the ends.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -49,8 +49,8 @@ auto powers(double low, double high, double sign = 1) {
 
 }  // namespace
 
-// fdlibm's own bounds: below 1 ulp each; Kahan's log1p and expm1 are a product of three values of 1/2 to 1 ulp.
-TEST_CASE("Portable elementary functions are right to an ulp", "[elementary]") {
+// Bounds of fdlibm: below 1 ulp each; Kahan's log1p and expm1 are products of three values of 1/2 to 1 ulp.
+TEST_CASE("Portable elementary functions are accurate to an ulp", "[elementary]") {
     const auto log = [](double x) { return portable::log(x); };
     CHECK(worst(log, logl, between(0, 1)) < 1);
     CHECK(worst(log, logl, between(0.9, 1.1)) < 1);
@@ -78,8 +78,8 @@ TEST_CASE("Portable elementary functions are right to an ulp", "[elementary]") {
         const double x = normal(random), y = normal(random) * (i % 2 ? 1 : 1e-9);
         angle.see(ulps(portable::atan2(y, x), atan2l(y, x)));
     }
-    CHECK(angle.ulp < 2);  // fdlibm's atan is below 1, the quotient adds 1/2
-    // Their argument is off by 3/2 units (two differences, a product, a root), and so is the angle at most.
+    CHECK(angle.ulp < 2);  // atan of fdlibm is below 1, the quotient adds 1/2
+    // The argument has an error of 3/2 ulp (two differences, a product, a root), and so has the angle at most.
     const auto asin = [](double x) { return portable::asin(x); };
     const auto acos = [](double x) { return portable::acos(x); };
     CHECK(worst(asin, asinl, between(-1, 1)) < 4);
@@ -111,6 +111,16 @@ TEST_CASE("Portable elementary functions at the ends of their ranges", "[element
     CHECK(portable::acos(1) == 0);
     CHECK(portable::asin(1) == std::asin(1.0));
     CHECK(portable::acos(-1) == std::acos(-1.0));
+    const double nan = std::nan("");
+    for (const auto f : {portable::log, portable::log1p, portable::exp, portable::expm1, portable::sin, portable::cos,
+                         portable::asin, portable::acos})
+        CHECK(std::isnan(f(nan)));
+    for (const double x : {0.0, -0.0, 1.0, -1.0, nan}) {
+        CHECK(std::isnan(portable::atan2(nan, x)));
+        CHECK(std::isnan(portable::atan2(x, nan)));
+    }
+    CHECK(std::isnan(portable::planar_hg_pdf(nan, 0.5)));
+    CHECK(std::isnan(portable::planar_hg_pdf(0.5, nan)));
     for (const double y : {0.0, -0.0, 1.0, -1.0})
         for (const double x : {0.0, -0.0, 1.0, -1.0}) {
             CAPTURE(y, x);
@@ -119,11 +129,11 @@ TEST_CASE("Portable elementary functions at the ends of their ranges", "[element
         }
 }
 
-TEST_CASE("The portable phase function is the runtime's", "[elementary]") {
+TEST_CASE("The portable phase function agrees with the runtime's", "[elementary]") {
     std::mt19937_64 random(3);
     for (int i = 0; i < 10000; ++i) {
         const double t = between(-2 * pi, 2 * pi)(random), g = between(-0.999, 0.999)(random);
-        // Both lose at most the angle's own rounding, pi 2^-53, against a width of (1 - |g|) at the peak.
+        // Both have at most the rounding of the angle, pi 2^-53, relative to a width of (1 - |g|) at the peak.
         CHECK(portable::planar_hg_pdf(t, g) == Approx(planar_hg_pdf(t, g)).epsilon(1e-12).margin(0));
     }
 }

@@ -1,4 +1,4 @@
-// When a cell is done: target errors against noise-free lobes, refinement by budget, and what a scene needs.
+// Stopping rules of cells: target errors against noise-free lobes, refinement by budget; and the nodes of a scene.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <map>
@@ -7,7 +7,7 @@
 #include "tables/error.hpp"
 #include "tables/job/budget.hpp"
 #include "tables/job/scene.hpp"
-#include "tables/job/schedule.hpp"
+#include "tables/job/worker_share.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;
@@ -42,9 +42,9 @@ std::vector<double> differences(const Slice& a, const Slice& b) {
 }  // namespace
 
 TEST_CASE("A cell's error at its target is the one that is stored", "[goals]") {
-    // Mean of (true error / standard error)^2 over the 28 cells is 1 for an honest one. The bounds are chosen, not
-    // derived: they see errors stated 1.4 times too large or 1.26 times too small. bench_simulation --compare measures
-    // it finer.
+    // The mean of (true error / standard error)^2 over the 28 cells is 1 for a correct standard error. The bounds are
+    // chosen, not derived: they detect errors stated 1.4 times too large or 1.26 times too small. bench_simulation
+    // --compare measures the mean more precisely.
     const SliceSolver exact(small_request(Method::deterministic));
     for (const Method method : {Method::mc, Method::analog}) {
         const SliceSolver solver(small_request(method));
@@ -52,11 +52,11 @@ TEST_CASE("A cell's error at its target is the one that is stored", "[goals]") {
             double sum = 0, cells = 0;
             for (const SliceId& id : slices_of(solver.plan())) {
                 const Slice random = solver.solve(id, target), truth = exact.solve(id, 1e-4);
-                const std::vector<double> off = differences(random, truth);
+                const std::vector<double> errors = differences(random, truth);
                 for (std::size_t c = 0; c < random.cells; ++c) {
                     CHECK(random.standard_error[c] <= target);
                     CHECK(random.standard_error[c] > 0);
-                    sum += off[c] * off[c] / (random.standard_error[c] * random.standard_error[c]), ++cells;
+                    sum += errors[c] * errors[c] / (random.standard_error[c] * random.standard_error[c]), ++cells;
                 }
             }
             INFO(name_of(method) << " to " << target);
@@ -66,7 +66,7 @@ TEST_CASE("A cell's error at its target is the one that is stored", "[goals]") {
     }
 }
 
-TEST_CASE("auto meets its target by grids, by walks in dense discs", "[goals]") {
+TEST_CASE("auto meets its target with grids, with traced paths in dense discs", "[goals]") {
     Request request = small_request(Method::automatic);
     request.sigma.values = {0.5, 300};
     request.g.values = {0.2};
@@ -75,23 +75,23 @@ TEST_CASE("auto meets its target by grids, by walks in dense discs", "[goals]") 
         request.method = Method::deterministic;
         return request;
     }()),
-        walks([&] {
+        traced([&] {
             request.method = Method::mc;
             return request;
         }());
-    const SliceId id = {TableName::azimuthal, 0, 0}, dense = {TableName::azimuthal, 1, 0};
+    const SliceId id = {TableId::azimuthal, 0, 0}, dense = {TableId::azimuthal, 1, 0};
     CHECK(solver.solve(id, 1e-4).lobe == grids.solve(id, 1e-4).lobe);
     for (const double target : {0.1, 1e-2, 1e-3, 1e-4}) CHECK(solver.solve(id, target).standard_error[0] <= target);
-    CHECK(solver.solve(dense, 0.05).lobe == walks.solve(dense, 0.05).lobe);
+    CHECK(solver.solve(dense, 0.05).lobe == traced.solve(dense, 0.05).lobe);
     CHECK(solver.solve(dense, 0.05).standard_error[0] <= 0.05);
 }
 
-TEST_CASE("A budget betters slices and never worsens one", "[goals]") {
+TEST_CASE("A time budget improves slices and never makes one worse", "[goals]") {
     const SliceSolver solver(small_request(Method::automatic));
     std::vector<Refinable> coarse;
     std::map<std::pair<std::uint32_t, std::uint32_t>, double> worst;
     for (const SliceId& id : slices_of(solver.plan())) {
-        if (id.table != TableName::azimuthal) continue;
+        if (id.table != TableId::azimuthal) continue;
         const Slice slice = solver.solve(id, refinements[0]);
         coarse.push_back({id, slice.standard_error, 0.001});
         worst[{id.sigma, id.g}] = *std::max_element(slice.standard_error.begin(), slice.standard_error.end());
@@ -109,7 +109,7 @@ TEST_CASE("A budget betters slices and never worsens one", "[goals]") {
     CHECK(refine(solver, coarse, 1, 2, never, keep) > 0);
 }
 
-TEST_CASE("A scene needs the nodes around what its materials ask for", "[goals]") {
+TEST_CASE("A scene keeps the nodes around the ranges of its materials", "[goals]") {
     FurParameters<3> fur = parameters_of<3>(*find_preset("red_fox"));
     const Needs fox = *needs_of(fur);
     CHECK(fox.sigma_low == Approx(0.86 * 3.15).epsilon(1e-6));
@@ -127,7 +127,7 @@ TEST_CASE("A scene needs the nodes around what its materials ask for", "[goals]"
     const Request part = restrict_to(whole, {red_fox, Material{"hair", fur, true}}, notes);
     CHECK(notes.empty());
     CHECK(part.sigma.values == std::vector<double>{1, 2, 3, 4, 5});  // 2.709 .. 3.654
-    CHECK(part.g.values == std::vector<double>{0.6, 0.79f, 0.85});   // a node itself and its neighbours
+    CHECK(part.g.values == std::vector<double>{0.6, 0.79f, 0.85});   // a node and its neighbours
     CHECK(part.h.values.back() < 1);
     CHECK(part.theta_i.values == whole.theta_i.values);
     whole.sigma.values = {0, 1, 3};

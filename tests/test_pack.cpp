@@ -1,4 +1,4 @@
-// Packs: what is written is what the runtime reads, and what is not a pack is refused with its reason.
+// Packs: the runtime reads what was written, and anything else is refused with a reason.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <random>
@@ -27,7 +27,7 @@ Eigen::VectorXd small_column(int r) {
     return c;
 }
 
-/// Rank-3 lobes: (1 + sigma)(1 - g) bump + (1 + g) constant + h wave, exactly representable but for rounding.
+/// Rank-3 lobes: (1 + sigma)(1 - g) bump + (1 + g) constant + h wave, exactly representable up to rounding.
 std::vector<unsigned char> small_pack() {
     const std::vector<double> sigma = {0, 1, 2, 4}, g = {0, 0.5}, h = {0, 0.3, 1};
     PackedTable table{TableKind::azimuthal, {}, Eigen::VectorXd::Ones(3), 2, 0, 1};
@@ -37,7 +37,7 @@ std::vector<unsigned char> small_pack() {
         for (std::size_t i = 0; i < nodes.size(); ++i)
             values.row(static_cast<Eigen::Index>(i)) << f0(nodes[i]), f1(nodes[i]), f2(nodes[i]);
         table.axes.push_back({q, static_cast<std::uint32_t>(nodes.size()), spline, spline.from_nodes() * values});
-        if (q == Quantity::h)  // the wave is odd in h: its coefficients about 0 cancel whatever they are rounded to
+        if (q == Quantity::h)  // the wave is odd in h: its coefficients about 0 cancel for any rounding
             table.axes.back().coefficients.col(2) = Spline::through(q, nodes, Mirror::odd).from_nodes() * values.col(2);
     };
     const auto one = [](double) { return 1.0; };
@@ -53,7 +53,7 @@ std::vector<unsigned char> small_pack() {
     return write_pack({table}, "{\"made\":\"test\"}");
 }
 
-/// Rewrites the checksum after a change, so that the check behind it is reached.
+/// Rewrites the checksum after a change, so that the checks after it are reached.
 void seal(std::vector<unsigned char>& bytes) {
     const std::uint64_t sum = pack_checksum(bytes.data(), bytes.size());
     std::memcpy(bytes.data() + offsetof(PackHeader, checksum), &sum, sizeof sum);
@@ -66,7 +66,7 @@ void poke(std::vector<unsigned char>& bytes, std::size_t offset, T value) {
 
 }  // namespace
 
-TEST_CASE("Numbers of every width come back as they were stored, one by one and eight abreast", "[pack]") {
+TEST_CASE("Numbers of every width are read as they were stored, one by one and eight at a time", "[pack]") {
     for (const std::uint32_t bits : {4u, 8u, 12u, 16u}) {
         const int step = 1 << (16 - bits), greatest = greatest_of(bits);
         for (int first = -greatest; first <= greatest; ++first) {
@@ -80,13 +80,13 @@ TEST_CASE("Numbers of every width come back as they were stored, one by one and 
             detail::store_eight(detail::convert_eight(block, bits), eight);
             for (std::uint32_t r = 0; r < 8; ++r)
                 if (load_number(block, bits, r) != numbers[r] || eight[r] != float(numbers[r])) FAIL(numbers[r]);
-            for (std::uint32_t i = bits; i < 16; ++i) REQUIRE(block[i] == 0);  // so many bytes and no more
+            for (std::uint32_t i = bits; i < 16; ++i) REQUIRE(block[i] == 0);  // writes no further bytes
         }
     }
     SUCCEED();
 }
 
-TEST_CASE("A row of blocks of unlike width has the numbers of each", "[pack]") {
+TEST_CASE("A row of blocks of different widths has the numbers of each", "[pack]") {
     // Factor r of sigma is 1 + r + sigma, four widths of eight components each; other axes do nothing.
     constexpr int rank = 32;
     PackedTable table{TableKind::back_fraction, {}, Eigen::VectorXd::Ones(rank), rank, 0, 1};
@@ -114,7 +114,7 @@ TEST_CASE("A row of blocks of unlike width has the numbers of each", "[pack]") {
             const double greatest = table.axes[0].coefficients.col(r).cwiseAbs().maxCoeff();
             const double unit = greatest / greatest_of(table.bits[r / 8]);
             CHECK(double(contraction.weight[r]) == Approx(1 + r + sigma).epsilon(1e-6).margin(unit / 2));
-            // The plain twin reads the same.
+            // The plain reference implementation reads the same.
             const auto scale = double(detail::load<float>(bytes.data() + view.layout.scales_offset + 4 * r));
             for (std::uint32_t j = 0; j < view.layout.axes[0].spans + 3; ++j)
                 CHECK(scale * view.number(0, j, r) * view.number(1, 0, r) * view.number(2, 0, r) ==
@@ -123,7 +123,7 @@ TEST_CASE("A row of blocks of unlike width has the numbers of each", "[pack]") {
     }
 }
 
-TEST_CASE("Rows blended and summed are those of eight components at a time, to the bit", "[pack]") {
+TEST_CASE("Blending and summing rows gives the same bits as eight components at a time", "[pack]") {
     const OpenResult opened = open_pack(default_pack_words, default_pack_size);
     REQUIRE(opened.status == PackStatus::ok);
     for (const TableView& table : opened.pack.tables) {
@@ -161,7 +161,7 @@ TEST_CASE("Rows blended and summed are those of eight components at a time, to t
     }
 }
 
-TEST_CASE("A pack's lobes are the factors' lobes, and integrate to 1", "[pack]") {
+TEST_CASE("A pack's lobes are those of its factors, and integrate to 1", "[pack]") {
     const std::vector<unsigned char> bytes = small_pack();
     const OpenResult opened = open_pack(bytes.data(), bytes.size());
     REQUIRE(opened.status == PackStatus::ok);
@@ -179,7 +179,7 @@ TEST_CASE("A pack's lobes are the factors' lobes, and integrate to 1", "[pack]")
             Eigen::VectorXd even =
                 (1 + double(sigma)) * (1 - double(g)) * small_column(0) + 2 * (1 + double(g)) * 0.5 * small_column(1);
             const double whole = 2 * exit.integrals().dot(even);
-            // Half of 1 / 32767 of the greatest coefficient in each of four axes.
+            // Half of 1 / 32767 of the largest coefficient, on each of four axes.
             const double rounding = 4 * 0.5 / greatest_number *
                                     (even.cwiseAbs().maxCoeff() + h * small_column(2).cwiseAbs().maxCoeff()) / whole;
             double integral = 0;
@@ -192,12 +192,13 @@ TEST_CASE("A pack's lobes are the factors' lobes, and integrate to 1", "[pack]")
                 CHECK(lobe(table, contraction, static_cast<float>(phi + 4 * pi)) == Approx(value).epsilon(1e-4));
             }
             CHECK(integral == Approx(1).epsilon(2e-6));  // float sums; midpoint rule, (2 pi / 2000)^2 / 24 of a slope
-            // h < 0 is the mirror image; h = 0 is its own, to the last bit.
+            // h < 0 gives the mirror image; h = 0 is symmetric to the last bit.
             CHECK(azimuthal(opened.pack, sigma, g, -0.4f, 1.0f) == azimuthal(opened.pack, sigma, g, 0.4f, -1.0f));
             query.h = 0;
             const Contraction central = contract(table, query);
             const float there = lobe(table, central, 1.0f);
-            CHECK(std::abs(lobe(table, central, -1.0f) - there) <= 1e-6f * there);  // float: the odd factor is h's 0
+            CHECK(std::abs(lobe(table, central, -1.0f) - there) <=
+                  1e-6f * there);  // float rounding of the odd factor, which is 0 at h = 0
         }
     CHECK(azimuthal(opened.pack, 0, 0.2f, 0.1f, 0.3f) == 0);
     CHECK(std::isnan(longitudinal(opened.pack, Side::back, 1, 0.2f, 0.1f, 0.3f)));  // no such table
@@ -249,7 +250,7 @@ TEST_CASE("Each defect of a pack is refused with its own status", "[pack]") {
         CHECK(std::string(describe(static_cast<PackStatus>(s))) != "unknown status");
 }
 
-TEST_CASE("No changed byte of a pack is read silently", "[pack]") {
+TEST_CASE("Every changed byte of a pack is detected", "[pack]") {
     std::vector<unsigned char> bytes = small_pack();
     std::mt19937 random(5);
     for (int i = 0; i < 20000; ++i) {
@@ -261,7 +262,7 @@ TEST_CASE("No changed byte of a pack is read silently", "[pack]") {
     }
 }
 
-TEST_CASE("Mutated packs with a valid checksum open and give finite numbers without leaving their bytes", "[pack]") {
+TEST_CASE("Mutated packs with a valid checksum give finite numbers and never read outside their bytes", "[pack]") {
     const std::vector<unsigned char> good = small_pack();
     std::mt19937 random(6);
     int opened_count = 0;
@@ -273,7 +274,7 @@ TEST_CASE("Mutated packs with a valid checksum open and give finite numbers with
         const OpenResult opened = open_pack(bytes.data(), bytes.size());
         if (opened.status != PackStatus::ok || !opened.pack[TableKind::azimuthal]) continue;  // a pack may be empty
         ++opened_count;
-        // Whatever the numbers are now, they lie inside the pack (the address sanitizer looks on).
+        // Reads stay inside the pack, which the address sanitizer checks.
         CHECK(std::isfinite(azimuthal(opened.pack, 1.5f, 0.3f, 0.2f, 1.0f)));
     }
     CHECK(opened_count > 0);

@@ -10,7 +10,7 @@ using namespace medulla;
 
 TEST_CASE("Phase function has integral 1, mean cosine g and Fourier coefficients g^|n|", "[phase]") {
     for (const double g : {-0.9, -0.3, 0.0, 0.2, 0.7, 0.95}) {
-        // The trapezoid rule on a periodic analytic function errs by |g|^n: 2e-9 at g = 0.95 with 400 points.
+        // The error of the trapezoid rule for a periodic analytic function is |g|^n: 2e-9 at g = 0.95 with 400 points.
         const int n = 400;
         double moment[4] = {};
         for (int i = 0; i < n; ++i) {
@@ -21,11 +21,11 @@ TEST_CASE("Phase function has integral 1, mean cosine g and Fourier coefficients
     }
 }
 
-TEST_CASE("Phase function keeps its peak's digits as g -> 1", "[phase]") {
+TEST_CASE("Phase function is accurate at its peak as g -> 1", "[phase]") {
     // p(0; g) = (1 + g) / (2 pi (1 - g)); 1 - g is exact here.
     const double g = 1 - 0x1p-40;
     CHECK(planar_hg_pdf(0.0, g) == Approx((1 + g) / (2 * pi * 0x1p-40)).epsilon(1e-14));
-    // The double nearest pi lies 1.2e-16 off it, half-angle 6e-17 against a half-width of 2^-41: relative 2e-8.
+    // The double nearest to pi differs by 1.2e-16, the half-angle by 6e-17, with a half-width of 2^-41: relative 2e-8.
     CHECK(planar_hg_pdf(pi, -g) == Approx((1 + g) / (2 * pi * 0x1p-40)).epsilon(1e-7));
 }
 
@@ -54,7 +54,7 @@ TEST_CASE("Sampled directions follow the density", "[phase]") {
     }
 }
 
-TEST_CASE("The inverse gives back the uniform direction", "[phase]") {
+TEST_CASE("The inverse returns the uniform direction", "[phase]") {
     sim2d::RandomStream random(3, 0, 0);
     for (int i = 0; i < 1000; ++i) {
         const double g = 1.9 * random.uniform() - 0.95;

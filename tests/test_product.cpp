@@ -1,9 +1,9 @@
-// The solvers' matrix product against its definition, for every instruction set.
+// The matrix product of the CP solvers against its definition, for every instruction set.
 #include <catch2/catch.hpp>
 #include <limits>
 #include <random>
 
-#include "sim2d/tracer/kernel.hpp"  // chooses the instruction set of all that Highway dispatches
+#include "sim2d/tracer/kernel.hpp"  // selects the instruction set of everything that Highway dispatches
 #include "tensor/product.hpp"
 
 using namespace medulla::tensor;
@@ -19,7 +19,7 @@ Matrix random_matrix(Eigen::Index rows, Eigen::Index columns, unsigned seed) {
     return Matrix::NullaryExpr(rows, columns, [&] { return even(bits); });
 }
 
-/// |c - (a b + before)| within the rounding of `inner` products and sums, whatever their order or fusion.
+/// |c - (a b + before)| within the rounding of `inner` products and sums, for any order or fusion.
 template <class A, class B>
 void check(const A& a, const B& b, const RowMatrix& before, const RowMatrix& c) {
     const double eps = std::numeric_limits<double>::epsilon();
@@ -38,7 +38,7 @@ void check(const A& a, const B& b, const RowMatrix& before, const RowMatrix& c) 
 
 }  // namespace
 
-TEST_CASE("Products of any shape and storage are those of the definition, on every instruction set", "[cp][product]") {
+TEST_CASE("Products of any shape and storage agree with the definition, on every instruction set", "[cp][product]") {
     for (const std::string& target : medulla::sim2d::tracer_targets()) {
         medulla::sim2d::set_tracer_target(target);
         for (const Eigen::Index rows : {1, 5, 6, 13})
@@ -53,7 +53,7 @@ TEST_CASE("Products of any shape and storage are those of the definition, on eve
                     check(a, b, zero, multiplied(a, b));
                     check(a, b, zero, multiplied(a_columns, b_columns));
                     check(a, b, zero, multiplied(a_turned.transpose(), b_turned.transpose()));
-                    // Into a block of something larger, whose other entries stay.
+                    // Into a block of a larger matrix, whose other entries are unchanged.
                     RowMatrix wide = random_matrix<RowMatrix>(rows + 2, columns + 3, 3);
                     const RowMatrix old = wide;
                     add_product(a, b, wide.block(1, 2, rows, columns));

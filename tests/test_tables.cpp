@@ -1,6 +1,4 @@
-// Simulation -> tables.h5 -> pack: round trips, determinism, and files that are not what they should be.
-#include <unistd.h>
-
+// Simulation -> tables.h5 -> pack: round trips, determinism, and invalid files.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
@@ -11,32 +9,15 @@
 #include "tables/pack/source.hpp"
 #include "tables/store/file.hpp"
 #include "tables/store/tables_file.hpp"
+#include "tests/support/small_request.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using namespace medulla;
 using namespace medulla::tables;
 
 namespace {
 
-Request small_request(Method method) {
-    Request request = default_request();
-    request.sigma = graded_axis("sigma", {0, 4, 5});
-    request.g = graded_axis("g", {0, 0.6, 3});
-    request.h = graded_axis("h", {0, 1, 4});
-    request.theta_i = graded_axis("theta_i", {0, 1.2, 3});
-    request.bins = 72;
-    request.paths = 2000;
-    request.method = method;
-    return request;
-}
-
-/// A folder that goes away.
-struct Folder {
-    std::filesystem::path path =
-        std::filesystem::temp_directory_path() / ("medulla_test_" + std::to_string(::getpid()));
-    Folder() { std::filesystem::create_directories(path); }
-    ~Folder() { std::filesystem::remove_all(path); }
-    std::string operator/(const char* name) const { return path / name; }
-};
+Request small_request(Method method) { return test::small_request(method, {5, 3, 4, 3}, 72, 2000); }
 
 void check_same(const Table& a, const Table& b) {
     CHECK(a.lobe == b.lobe);
@@ -49,7 +30,7 @@ void check_same(const Table& a, const Table& b) {
 
 }  // namespace
 
-TEST_CASE("Same seed, same values for 1, 2 and 5 threads, others for another seed", "[tables]") {
+TEST_CASE("The same seed gives the same values for 1, 2 and 5 threads, another seed others", "[tables]") {
     for (const Method method : {Method::mc, Method::automatic}) {
         Request request = small_request(method);
         request.threads = 1;
@@ -78,8 +59,9 @@ TEST_CASE("A cell's values do not depend on the table around it", "[tables]") {
     CHECK_FALSE(alone.longitudinal);
 }
 
-TEST_CASE("Tables files give back what was written, by every compression, with the same bytes twice", "[tables]") {
-    const Folder folder;
+TEST_CASE("Tables files return what was written, with every compression, and are reproducible byte for byte",
+          "[tables]") {
+    const test::TemporaryFolder folder;
     const Tables tables = simulate(small_request(Method::mc), ProgressMode::none);
     for (const Compression compression : {Compression::none, Compression::gzip, Compression::zstd}) {
         const std::string path = folder / "t.h5", again = folder / "u.h5";
@@ -91,12 +73,12 @@ TEST_CASE("Tables files give back what was written, by every compression, with t
         check_same(*read.longitudinal, *tables.longitudinal);
         CHECK(read.azimuthal->method == tables.azimuthal->method);
     }
-    for (const auto& entry : std::filesystem::directory_iterator(folder.path))
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path()))
         CHECK(entry.path().extension() == ".h5");  // no temporary file is left
 }
 
-TEST_CASE("A damaged tables file is refused, never read as something else", "[tables]") {
-    const Folder folder;
+TEST_CASE("A damaged tables file is refused, never misread", "[tables]") {
+    const test::TemporaryFolder folder;
     const Tables tables = simulate(small_request(Method::mc), ProgressMode::none);
     const std::string path = folder / "t.h5", broken = folder / "broken.h5";
     write_tables(path, tables, Compression::zstd);
@@ -108,7 +90,7 @@ TEST_CASE("A damaged tables file is refused, never read as something else", "[ta
         write_file(broken, bytes.data(), bytes.size());
         try {
             const Tables read = read_tables(broken);
-            check_same(*read.azimuthal, *tables.azimuthal);  // a flip in unused bytes may pass, if nothing differs
+            check_same(*read.azimuthal, *tables.azimuthal);  // a flip in unused bytes may pass if no value differs
             check_same(*read.longitudinal, *tables.longitudinal);
         } catch (const Error&) {
             ++refused;
@@ -122,7 +104,7 @@ TEST_CASE("A damaged tables file is refused, never read as something else", "[ta
     CHECK_THROWS_AS(read_tables(broken), Error);
 }
 
-TEST_CASE("Off its nodes a table is asked through the same splines as a pack", "[tables]") {
+TEST_CASE("Between its nodes a table is interpolated by the splines of a pack", "[tables]") {
     const Tables tables = simulate(small_request(Method::mc), ProgressMode::none);
     const auto source = table_source(tables);
     Parameters at;

@@ -1,4 +1,4 @@
-// The fast tracer against its analog twin, the deterministic solvers and closed forms (docs/physics.md, 2 to 4).
+// The fast tracer against the analog tracer, the deterministic solvers and closed forms (docs/physics.md, 2 to 4).
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
@@ -48,7 +48,7 @@ Moments moments(const std::vector<double>& v) {
     return {m, std::sqrt(s / (n - 1) / n)};
 }
 
-/// p-value of an analog lobe of n paths against the fast one, which is taken for exact.
+/// p-value of an analog lobe of n paths, taking the fast one as exact.
 double twin_p(const std::vector<double>& analog, const std::vector<double>& fast, double width, double n) {
     std::vector<double> counts, probability;
     for (std::size_t i = 0; i < fast.size(); ++i)
@@ -56,7 +56,7 @@ double twin_p(const std::vector<double>& analog, const std::vector<double>& fast
     return test::chi_squared_p(counts, probability, n);
 }
 
-TEST_CASE("Lanes draw the words of the scalar Philox", "[tracer]") {
+TEST_CASE("The SIMD generator gives the same random words as the scalar Philox", "[tracer]") {
     TracerCell cell;
     cell.seed = 0x123456789ABCDEFull, cell.cell = 0xFEDCBA9876543210ull;
     for (const std::uint32_t order : {1u, 77u, 0xFFFFFFu})
@@ -70,7 +70,7 @@ TEST_CASE("Lanes draw the words of the scalar Philox", "[tracer]") {
 }
 
 TEST_CASE("Fast and analog tracer agree on both tables", "[tracer]") {
-    // Bonferroni: 24 lobes at 1e-5 each. The fast lobe's own error is a tenth of the counts' or less.
+    // Bonferroni: 24 lobes at 1e-5 each. The error of the fast lobe is at most a tenth of that of the counts.
     const std::uint64_t paths = 40000;
     const auto n = static_cast<double>(paths);
     std::uint64_t cell = 0;
@@ -84,8 +84,7 @@ TEST_CASE("Fast and analog tracer agree on both tables", "[tracer]") {
             INFO("sigma " << sigma << " g " << g);
             CHECK(twin_p(a.lobe, b.lobe, 2 * pi / 48, n) > 1e-5);
             CHECK(a.energy == Approx(b.energy).epsilon(1e-12));
-            // Lengths are at most of the order of their mean times the scatterings: 5 standard errors of a path
-            // length whose deviation is below three times its mean.
+            // 5 standard errors of a path length whose standard deviation is below three times its mean.
             CHECK(std::abs(a.mean_length - b.mean_length) < 15 * b.mean_length / std::sqrt(n));
 
             const SlabProfile c = trace_slab(sigma, g, theta, 24, slow);
@@ -102,10 +101,10 @@ TEST_CASE("Fast and analog tracer agree on both tables", "[tracer]") {
 }
 
 TEST_CASE("Standard errors are those of independent repetitions against the deterministic solvers", "[tracer]") {
-    // E[true error^2 - standard error^2] = 0 for an unbiased estimate with an honest error; tested at 5 of its own
-    // standard errors over 60 repetitions. Errors near 2 % leave the references' 1e-3 unseen: 0.3 % of the square.
+    // E[true error^2 - standard error^2] = 0 for an unbiased estimate with a correct error; tested at 5 standard errors
+    // over 60 repetitions. The references' 1e-3 is negligible beside errors near 2 %: 0.3 % of the square.
     const std::vector<double> h{0.0, 0.55, 0.97}, theta{0.0, 0.7, 1.4};
-    std::vector<double> all;  // ratio per cell, to see a common drift that single cells hide
+    std::vector<double> all;  // ratio per cell: shows a common bias that is below the noise of single cells
     for (const double g : {0.0, 0.6, 0.95}) {
         const DiscSolver disc(g);
         const SlabSolver slab(g);
@@ -130,7 +129,7 @@ TEST_CASE("Standard errors are those of independent repetitions against the dete
                     const double scale = moments(square[k]).mean;
                     INFO("sigma " << sigma << " g " << g << " node " << i << " lobe " << k << " error "
                                   << std::sqrt(scale) << " excess " << m.mean / scale << " +- " << m.error / scale);
-                    // References: |true - found|^2 is off by their own square and twice a product that averages out.
+                    // The references' errors add their square to |true - found|^2, and a product that averages to 0.
                     CHECK(std::abs(m.mean) < 5 * m.error + 4e-6);
                     all.push_back(m.mean / scale);
                 }
@@ -141,9 +140,9 @@ TEST_CASE("Standard errors are those of independent repetitions against the dete
     CHECK(std::abs(m.mean) < 5 * m.error + 0.02);
 }
 
-TEST_CASE("Stated errors stand a chi-squared test, whatever ends a run", "[tracer]") {
+TEST_CASE("Stated errors pass a chi-squared test for every stopping rule", "[tracer]") {
     // The slab's back energy over its stated error is Student's t of fifteen degrees, from sixteen randomisations:
-    // p-values of independent repetitions are even. Ending at a target picks runs that look good; they must stand too.
+    // p-values of independent repetitions are uniform. A target stops at runs that look good; they must pass as well.
     // Three tests at 1e-3.
     const double theta = 0.6;
     for (const TracerOptions& o : {options(1024), options(16384), options(1 << 20, 1, 0.03)}) {
@@ -166,7 +165,7 @@ TEST_CASE("Stated errors stand a chi-squared test, whatever ends a run", "[trace
 
 TEST_CASE("Mean path length: isotropic light on the disc pi / 2, on the slab pi, for every sigma and g", "[tracer]") {
     // Blanco and Fournier 2003: pi area / perimeter in the plane. Scattered and unscattered light together.
-    const GaussRule rule = unit_gauss_rule(24);
+    const Quadrature rule = unit_gauss_legendre(24);
     for (const double sigma : {0.2, 2.0, 8.0})
         for (const double g : {-0.5, 0.0, 0.9}) {
             double disc = 0, slab = 0, disc_noise = 0;
@@ -183,7 +182,8 @@ TEST_CASE("Mean path length: isotropic light on the disc pi / 2, on the slab pi,
                 slab += weight * (s.back.energy * s.back.mean_length + s.forward.energy * s.forward.mean_length +
                                   (1 - f) * through);
             }
-            // A walk's length deviates by about its mean; 5 of these. The slab's is heavier: twice that.
+            // The standard deviation of a path length is about its mean; 5 standard errors. The slab's has a heavier
+            // tail: twice that.
             const double noise = 5 * std::sqrt(disc_noise);
             INFO("sigma " << sigma << " g " << g << " noise " << noise);
             CHECK(std::abs(disc - pi / 2) < noise + 1e-4);
@@ -197,20 +197,21 @@ TEST_CASE("Every plan has the same mean", "[tracer]") {
             TracerCell cell;
             cell.medium = medium, cell.sigma = 3, cell.g = g, cell.h = 0.3, cell.theta_i = 0.9, cell.bins = 240;
             std::vector<TracerPlan> plans(5);
-            plans[0].forced = 0, plans[0].pay = 1e-6f, plans[0].turned = 1;  // analog flights, everything is paid
+            plans[0].forced = 0, plans[0].roulette = 1e-6f,
+            plans[0].turned = 1;  // analog flights, every vertex deposits
             plans[1].comb = 8;
             plans[2].comb = 8, plans[2].window = 48;
-            plans[3].pay = 3, plans[3].turned = 0.1f, plans[3].forced = 12, plans[3].keep = 0.9f;
+            plans[3].roulette = 3, plans[3].turned = 0.1f, plans[3].forced = 12, plans[3].keep = 0.9f;
             plans[4] = plan_of(cell);
             std::vector<std::vector<double>> mean(plans.size()), error(plans.size());
             for (std::size_t k = 0; k < plans.size(); ++k) {
                 cell.plan = plans[k], cell.seed = k;
-                WalkTracer tracer(cell);
+                PathTracer tracer(cell);
                 std::vector<std::vector<double>> coarse(12);
                 for (std::uint32_t r = 0; r < 24; ++r) {
                     TracerSums sums;
                     tracer.trace(r, 0, 512, sums);
-                    REQUIRE(sums.walks == 512);
+                    REQUIRE(sums.paths == 512);
                     for (std::size_t c = 0; c < 12; ++c)
                         coarse[c].push_back(std::accumulate(sums.bins.begin() + std::ptrdiff_t(20 * c),
                                                             sums.bins.begin() + std::ptrdiff_t(20 * c + 20), 0.0));
@@ -223,7 +224,7 @@ TEST_CASE("Every plan has the same mean", "[tracer]") {
             for (std::size_t k = 1; k < plans.size(); ++k)
                 for (std::size_t c = 0; c < 12; ++c) {
                     INFO("slab " << (medium == Medium::slab) << " g " << g << " plan " << k << " part " << c);
-                    // 288 comparisons of t with 23 degrees: 6 is one in 10^3 runs for all together.
+                    // 288 comparisons of t with 23 degrees of freedom: 6 fails one in 10^3 runs.
                     CHECK(std::abs(mean[k][c] - mean[0][c]) < 6 * std::hypot(error[k][c], error[0][c]));
                 }
         }
@@ -272,10 +273,12 @@ TEST_CASE("Mirror images", "[tracer]") {
     Profile b = trace_expected_disc(2, 0.5, -0.6, n, options(65536, 2)).profile;
     std::reverse(b.lobe.begin(), b.lobe.end());
     for (std::size_t i = 0; i < n; ++i) {
-        CHECK(centre.lobe[i] == Approx(centre.lobe[n - 1 - i]).epsilon(1e-6));  // the single lobe's quadrature
+        CHECK(centre.lobe[i] ==
+              Approx(centre.lobe[n - 1 - i]).epsilon(1e-6));  // quadrature of the singly scattered lobe
         CHECK(normal.back.lobe[i] == Approx(normal.back.lobe[n - 1 - i]).epsilon(1e-6));
     }
-    // Relative L2 error of a difference is that of either times sqrt(2); it is a mean over bins, so 3 is far out.
+    // The relative L2 error of a difference is sqrt(2) times that of either. It is a mean over bins, so a factor of 3
+    // is far beyond its scatter.
     CHECK(std::sqrt(distance2(a.lobe, b.lobe)) < 3 * std::sqrt(2.0) * a.standard_error);
 }
 
@@ -288,8 +291,8 @@ void check_lobe(const Profile& p, double width) {
     CHECK((p.energy >= 0 && p.energy <= 1 && std::isfinite(p.energy_error)));
 }
 
-TEST_CASE("The tracer holds at the ends of every range", "[tracer][stress]") {
-    TracerOptions o = options(1);  // one path: sixteen, one per randomisation
+TEST_CASE("The tracer is finite and normalised at the ends of every range", "[tracer][stress]") {
+    TracerOptions o = options(1);  // rounded up to sixteen, one per randomisation
     for (const double sigma : {0.0, 5e-324, 1e-300, 1e-38, 1e-8, 1.0, 1e3})
         for (const double g : {-0.99, 0.0, 0.999}) {
             for (const double h : {0.0, 5e-324, 1.0, 1 - 1e-7, -1.0}) {
@@ -315,7 +318,7 @@ TEST_CASE("The tracer holds at the ends of every range", "[tracer][stress]") {
         check_lobe(trace_expected_disc(2, 0.95, 0.1, bins, o).profile, 2 * pi / double(bins));
     o.seed = ~std::uint64_t{0}, o.cell = ~std::uint64_t{0};
     check_lobe(trace_expected_disc(2, 0.95, 0.1, 36, o).profile, 2 * pi / 36);
-    // An empty disc scatters by the phase function alone.
+    // In the limit of an empty disc the lobe is the phase function.
     const Profile empty = trace_expected_disc(0, 0.5, 0.3, 90, options(1)).profile;
     for (std::size_t i = 0; i < 90; ++i) {
         const double low = -pi + double(i) * 2 * pi / 90;
@@ -330,11 +333,11 @@ TEST_CASE("The tracer holds at the ends of every range", "[tracer][stress]") {
     CHECK_THROWS_AS(trace_expected_slab(1, 0, 0, 8, options(0)), std::invalid_argument);
 }
 
-TEST_CASE("Walks with absorption: the deterministic solver's lobes, energies and lengths by z-scores",
+TEST_CASE("Paths with absorption: lobes, energies and lengths agree with the deterministic solver",
           "[tracer][absorption]") {
     // As above: E[true error^2 - standard error^2] = 0 over independent repetitions, at 5 of its own standard errors,
-    // for lobes and energies. Means over the repetitions at 5 of their standard errors; energies of the reference keep
-    // 2e-4, its lengths 1e-3 and 3e-5 over the share of collided light that leaves (sim2d/disc/deterministic.hpp).
+    // for lobes and energies. Means over the repetitions at 5 standard errors. Errors of the reference: energies 2e-4,
+    // lengths 1e-3 + 3e-5 / (share of collided light that leaves) (sim2d/disc/deterministic.hpp).
     const std::vector<double> absorption{0.0, 0.1, 1.0, 6.0}, h{0.0, 0.55, 0.97};
     for (const double g : {0.0, 0.6, 0.95}) {
         const DiscSolver solver(g);
@@ -352,7 +355,7 @@ TEST_CASE("Walks with absorption: the deterministic solver's lobes, energies and
                         lobe[j].push_back(distance2(p.lobe, truth.lobe) - e * e);
                         energy[j].push_back(p.energy), length[j].push_back(p.mean_length);
                         excess[j].push_back(miss * miss - p.energy_error * p.energy_error);
-                        // The same walks: less is left, and what is left went the shorter ways.
+                        // The same paths: less energy is left, and it took the shorter paths.
                         if (j > 0) falls = falls && p.energy < found[j - 1].energy;
                     }
                 }
@@ -379,8 +382,9 @@ TEST_CASE("Walks with absorption: the deterministic solver's lobes, energies and
     }
 }
 
-TEST_CASE("Walks in the slab: the deterministic solver's mean paths on either side", "[tracer][paths]") {
-    // Means over 20 repetitions at 5 of their standard errors; a path is a quotient, of bias O(1 / paths).
+TEST_CASE("Paths in the slab: mean path lengths on either side agree with the deterministic solver",
+          "[tracer][paths]") {
+    // Means over 20 repetitions at 5 standard errors. A mean path is a ratio, with a bias of O(1 / paths).
     for (const double g : {-0.5, 0.0, 0.9}) {
         const SlabSolver solver(g);
         for (const double sigma : {0.1, 1.0, 8.0})
@@ -401,7 +405,7 @@ TEST_CASE("Walks in the slab: the deterministic solver's mean paths on either si
     }
 }
 
-TEST_CASE("Walks without absorption in the list are those of the plain tracer, byte for byte", "[tracer][absorption]") {
+TEST_CASE("Absorption 0 in the list gives the plain tracer's result, byte for byte", "[tracer][absorption]") {
     for (const double sigma : {0.0, 1e-8, 3.0}) {
         const Traced<Profile> plain = trace_expected_disc(sigma, 0.8, 0.4, 96, options(2048));
         const auto all = trace_expected_disc(sigma, 0.8, 0.4, {1.5, 0.0, 200.0}, 96, options(2048));
@@ -410,7 +414,7 @@ TEST_CASE("Walks without absorption in the list are those of the plain tracer, b
         CHECK(all.profile[1].standard_error == plain.profile.standard_error);
         CHECK(all.profile[1].energy == plain.profile.energy);
         CHECK(all.profile[1].mean_length == plain.profile.mean_length);
-        // An empty disc: what is scattered once is closed form, and all there is.
+        // An empty disc: single scattering, a closed form, is everything.
         if (sigma < 1e-6)
             for (const std::size_t j : {0u, 2u}) {
                 const double a = j == 0 ? 1.5 : 200;
@@ -425,7 +429,7 @@ TEST_CASE("Walks without absorption in the list are those of the plain tracer, b
     CHECK_THROWS_AS(trace_disc(1, 0, 0, {std::nan("")}, 8, {}), std::invalid_argument);
 }
 
-TEST_CASE("Every instruction set follows the same walks", "[tracer]") {
+TEST_CASE("Every instruction set traces the same paths", "[tracer]") {
     struct Restore {
         ~Restore() { set_tracer_target(""); }
     } restore;
@@ -439,8 +443,8 @@ TEST_CASE("Every instruction set follows the same walks", "[tracer]") {
         discs.push_back(trace_expected_disc(3, 0.8, 0.3, 120, options(4096)).profile);
         backs.push_back(trace_expected_slab(3, 0.8, 0.3, 60, options(4096)).profile.back);
     }
-    // The same random numbers, other roundings: walks part where a float's 1e-7 decides, which is one in 10^4 of some
-    // ten decisions each; so their difference is 1e-2 of two independent runs', a tenth is far out.
+    // The same random numbers with different rounding: paths diverge where 1e-7 decides, about one in 10^4 with some
+    // ten decisions each. So the difference is 1e-2 of that of two independent runs; a tenth is far beyond it.
     for (std::size_t t = 1; t < discs.size(); ++t) {
         INFO(tracer_targets()[t] << ", difference over standard error "
                                  << std::sqrt(distance2(discs[t].lobe, discs[0].lobe)) / discs[0].standard_error);
@@ -449,29 +453,29 @@ TEST_CASE("Every instruction set follows the same walks", "[tracer]") {
     }
 }
 
-TEST_CASE("The last walks of seed space are as good as the first, and others", "[tracer][stress]") {
-    // 2^8 randomisations of 2^32 walks: the 2^40 paths of a cell.
+TEST_CASE("The last paths of the counter space are as random as the first, and different", "[tracer][stress]") {
+    // 2^8 randomisations of 2^32 paths: the 2^40 paths of a cell.
     TracerCell cell;
     cell.sigma = 3, cell.g = 0.5, cell.h = 0.3, cell.bins = 24;
     cell.plan = plan_of(cell);
-    const std::uint64_t walks = 2048, last = (std::uint64_t{1} << 32) - walks;
-    WalkTracer tracer(cell);
+    const std::uint64_t count = 2048, last = (std::uint64_t{1} << 32) - count;
+    PathTracer tracer(cell);
     std::vector<double> total[2];
     std::vector<std::vector<double>> bins[2];
     for (std::uint32_t r = 0; r < 24; ++r)
         for (const int end : {0, 1}) {
             TracerSums sums;
-            tracer.trace(end ? 255 - r : r, end ? last : 0, walks, sums);
-            REQUIRE(sums.walks == walks);
+            tracer.trace(end ? 255 - r : r, end ? last : 0, count, sums);
+            REQUIRE(sums.paths == count);
             for (const double x : sums.bins) REQUIRE((std::isfinite(x) && x >= 0));
             total[end].push_back(sum(sums.bins)), bins[end].push_back(sums.bins);
         }
     for (std::size_t r = 0; r < 24; ++r)
         for (std::size_t q = 0; q < 24; ++q) CHECK(bins[0][r] != bins[1][q]);
-    // t of 23 degrees: 6 is once in 10^5.
+    // Student's t of 23 degrees of freedom exceeds 6 once in 10^5.
     const Moments a = moments(total[0]), b = moments(total[1]);
     CHECK(std::abs(a.mean - b.mean) < 6 * std::hypot(a.error, b.error));
-    // Consecutive blocks and the two ends: no word of a walk's first scatterings comes twice.
+    // Consecutive blocks and both ends: no random word of a path's first collisions occurs twice.
     std::set<std::array<std::uint32_t, 4>> seen;
     for (const std::uint32_t randomisation : {0u, 1u, 254u, 255u})
         for (const std::uint32_t order : {1u, 2u, 0xFFFFFEu})

@@ -14,7 +14,6 @@
 namespace medulla::sim2d {
 namespace {
 
-const double pi = 3.14159265358979323846;
 using Complex = std::complex<double>;
 
 void require(bool condition, const char* what) {
@@ -51,7 +50,7 @@ Stencil stencil_at(const std::vector<double>& offset, double h) {
     return s;
 }
 
-/// What leaves at the offset h, over the energy of the first collisions: I(-b, -phi) = I(b, phi).
+/// Exit radiance at the offset h, relative to the energy of the first collisions: I(-b, -phi) = I(b, phi).
 struct Light {
     std::vector<Complex> c;
     double rest = 0, length = 0;  ///< see DiscExit
@@ -98,10 +97,10 @@ void add_modes(const std::vector<Complex>& c, std::vector<double>& lobe) {
     }
 }
 
-/// Measured (docs/accuracy.md), for sigma <= 16 and |g| <= 0.95. Errors fall like the third power of all steps.
-/// Scattering makes the source under the rim behave like z log z over a depth z = rim^2 / 2; light that is scattered
-/// twice carries modes of g^(2 k). Narrow phase functions need modes, not circles: light that turns slowly changes
-/// slowly on the way inwards.
+/// Constants fitted to the errors of bench/bench_disc over sigma <= 16 and |g| <= 0.95 (docs/accuracy.md). Errors fall
+/// with the third power of all steps. Below the rim the source behaves like z log z over a depth z = rim^2 / 2; modes
+/// of light scattered twice fall as g^(2 k). Narrow phase functions need modes rather than circles: light that turns
+/// slowly changes slowly on its way inwards.
 DiscGridSize automatic(double sigma, double sigma_a, double g, const DiscOptions& options) {
     const double scale = portable::exp(portable::log(options.target_error / 1e-3) / 3),
                  depth = std::min(sigma + sigma_a, 40.0);
@@ -117,7 +116,7 @@ DiscGridSize automatic(double sigma, double sigma_a, double g, const DiscOptions
     size.growth = 1 + scale * (0.17 + 0.13 * portable::exp(-depth / 4));
     const double visible = 0.6 * options.target_error / std::min(sigma, 1.0);
     const double tail = g == 0 || visible >= 1 ? 0 : portable::log(visible) / (2 * portable::log(narrow));
-    // Near the tangent the lobe has a kink at phi = 0, softened by g only: algebraic in the modes.
+    // Near the tangent the lobe has a kink at phi = 0, smoothed by g only: modes fall algebraically.
     const double root = std::min(std::sqrt(depth), 8.0);
     const double sharp = 3 * std::max(0.0, narrow - 0.5) + 12 * std::max(0.0, narrow - 0.9);
     const double kink = (19 + 5 * root + (31 + 2 * root) * sharp) / std::max(scale, 0.5);
@@ -134,11 +133,11 @@ DiscGridSize coarser(const DiscGridSize& size) {
             std::min(size.gap * coarsening, 0.5), size.rim * coarsening, 1 + (size.growth - 1) * coarsening};
 }
 
-/// Third order: a coarse grid misses coarsening^3 times what the fine one does. Error of the fine grid over the
+/// Third order: the coarse grid's error is coarsening^3 times the fine one's. Ratio of the fine grid's error to the
 /// difference of the two.
 const double share = 1 / (coarsening * coarsening * coarsening - 1);
 
-/// Of a lobe's bin averages over the circle.
+/// Integral of bin averages over the circle.
 double integral(const std::vector<double>& lobe) {
     double sum = 0;
     for (const double x : lobe) sum += x * (2 * pi / static_cast<double>(lobe.size()));
@@ -159,8 +158,9 @@ DiscSolver::DiscSolver(double g, const DiscOptions& options) : g_(g), options_(o
     require(options.circles == 0 || options.circles >= 6, "circles: expected at least 6, or 0");
     require(options.modes == 0 || options.modes >= 8, "modes: expected at least 8, or 0");
     require(options.target_error >= 1e-6 && options.target_error <= 0.1, "target_error: expected 1e-6 to 0.1");
-    require(options.rim >= 0, "rim: expected an angle > 0, or 0");
-    require(options.gap >= 0, "gap: expected an angle > 0, or 0");
+    require(options.rim == 0 || options.rim >= 1e-9, "rim: expected an angle of 1e-9 or more, or 0");
+    require(options.gap == 0 || options.gap >= 1e-4, "gap: expected an angle of 1e-4 or more, or 0");
+    require(options.most_steps >= 1, "most_steps: expected at least 1");
 }
 
 std::vector<Profile> DiscSolver::solve(double sigma, const std::vector<double>& h, std::size_t bins) const {
@@ -175,26 +175,28 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
     for (const double offset : h) require(offset >= -1 && offset <= 1, "h: expected a value in [-1, 1]");
     const double extinction = sigma + sigma_a;
     const DiscGridSize size = automatic(sigma, sigma_a, g_, options_);
-    // Everything is divided by the energy of the first collisions, so a limit sigma -> 0 is a solve at a sigma that
-    // adds nothing to it in double precision.
+    // Everything is relative to the energy of the first collisions, so the limit sigma -> 0 is a solve at a sigma whose
+    // multiple scattering is below double precision.
     const double visible = std::max(sigma, 1e-30), tolerance = 0.02 * std::min(options_.target_error, 1e-3);
     const bool two_grids = options_.estimate_error;
     DiscExit coarse;
-    const DiscExit fine = solve_disc_transport(DiscGrid(g_, size), visible, sigma_a, tolerance);
-    if (two_grids) coarse = solve_disc_transport(DiscGrid(g_, coarser(size)), visible, sigma_a, tolerance);
+    const DiscExit fine = solve_disc_transport(DiscGrid(g_, size), visible, sigma_a, tolerance, options_.most_steps);
+    if (two_grids)
+        coarse = solve_disc_transport(DiscGrid(g_, coarser(size)), visible, sigma_a, tolerance, options_.most_steps);
     std::vector<Profile> profiles;
     for (const double offset : h) {
         Profile profile;
         const double chord = 2 * std::sqrt((1 - offset) * (1 + offset));
         const double collided = sigma > 0 ? disc_energy(extinction, offset) * (sigma / extinction) : 0;
         profile.lobe = disc_single_lobe(extinction, g_, offset, bins);
-        // Few bins are too coarse a rule for what leaves; without absorption nothing but energy_error rests on it.
+        // With few bins their midpoints are too coarse a quadrature; without absorption only energy_error depends on
+        // it.
         const std::size_t points = sigma_a > 0 ? std::max<std::size_t>(bins, 180) : bins;
         const double single =
             points == bins ? integral(profile.lobe) : integral(disc_single_lobe(extinction, g_, offset, points));
         const Light light = at_offset(fine, offset);
-        // The fraction of collided light that leaves, twice: as integral of the lobe, and as what is not absorbed on
-        // the way. Each is used where it keeps its digits.
+        // The fraction of collided light that leaves, computed twice: as the integral of the lobe and as the light that
+        // is not absorbed on the way. Each is used where it is accurate.
         const auto leaves = [&](const Light& l) {
             const double lobe = single + 2 * pi * l.c[0].real(), path = 1 - sigma_a * l.rest;
             return std::pair{lobe, path * path + (1 - path) * lobe};
@@ -218,7 +220,8 @@ std::vector<Profile> DiscSolver::solve(double sigma, double sigma_a, const std::
             }
             profile.standard_error = share * std::sqrt(error / square) + (sigma > 0 ? fine.residual : 0);
         }
-        // Truncated modes ring. The truth is not negative, so its nearest lobe that is not either is nearer to it.
+        profile.standard_error += fine.unconverged, profile.energy_error += fine.unconverged * collided;
+        // Truncated modes ring. The true lobe is not negative, so clamping at 0 reduces the error.
         for (double& x : profile.lobe) x = std::max(x, 0.0);
         const double sum = integral(profile.lobe);
         for (double& x : profile.lobe) x /= sum;

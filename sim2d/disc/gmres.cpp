@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "sim2d/disc/lanes.hpp"
 
@@ -10,7 +11,8 @@ namespace {
 
 using PerMode = std::vector<double>;
 
-const std::size_t block_rows = 32;  ///< a block of a field stays in the first cache over all basis vectors
+const std::size_t block_rows =
+    32;  ///< so that a block of a field stays in the first-level cache over all basis vectors
 
 /// products[i][k] = sum over rows of x y_i, i < count; within a block in DiscReal, over blocks in double.
 void dots(const DiscField& x, const std::vector<DiscField>& y, std::size_t count, std::size_t stride,
@@ -60,14 +62,15 @@ void multiply(DiscField& a, const PerMode& scale, std::size_t active) {
 
 }  // namespace
 
-DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t stride, double tolerance) {
-    const std::size_t most = 60, size = right_side.size();
+DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t stride, double tolerance,
+                    std::size_t most) {
+    const std::size_t size = right_side.size();
     std::vector<DiscField> basis;
     basis.push_back(std::move(right_side));
-    // Modes do not couple: each has its own Krylov space and rotation, but all share the passes over memory.
+    // Modes do not couple: each has its own Krylov space and rotations, but all share the passes over memory.
     PerMode norm = square(basis[0], stride, stride), scale(stride, 0.0);
     for (double& n : norm) n = std::sqrt(n);
-    scale[0] = norm[0];  // the path length has a scale of its own
+    scale[0] = norm[0];  // column 0, the path length, has its own scale
     std::fill(scale.begin() + 1, scale.end(), *std::max_element(norm.begin() + 1, norm.end()));
     std::vector<PerMode> column(most * (most + 1), PerMode()), cosine, sine, right(1, norm);
     const auto h = [&](std::size_t i, std::size_t j) -> PerMode& { return column[j * (most + 1) + i]; };
@@ -88,7 +91,7 @@ DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t
         apply(basis[j], next, active);
         for (std::size_t at = 0; at < next.size(); at += stride)
             for (std::size_t k = 0; k < active; ++k) next[at + k] = basis[j][at + k] - next[at + k];
-        // Classical Gram-Schmidt: two passes over the basis. What it loses in orthogonality costs steps, not accuracy.
+        // Classical Gram-Schmidt: two passes over the basis. Its loss of orthogonality costs steps, not accuracy.
         dots(next, basis, j + 1, stride, active, &h(0, j));
         subtract_all(next, basis, j + 1, active, &h(0, j));
         PerMode length = square(next, stride, active);
@@ -119,20 +122,29 @@ DiscIteration gmres(const DiscOperator& apply, DiscField right_side, std::size_t
     }
     DiscIteration result;
     result.iterations = static_cast<int>(j);
+    result.converged = active == 0;
+    double unsolved = 0;  // squares of the residuals of columns 1 and on
     std::vector<PerMode> weight(std::max<std::size_t>(j, 1), PerMode(stride, 0.0));
     for (std::size_t k = 0; k < stride; ++k) {
         result.residual = std::max(result.residual, scale[k] > 0 ? std::abs(right[steps[k]][k]) / scale[k] : 0);
+        if (k > 0) unsolved += right[steps[k]][k] * right[steps[k]][k];
         for (std::size_t i = steps[k]; i-- > 0;) {
             double value = right[i][k];
             for (std::size_t c = i + 1; c < steps[k]; ++c) value -= h(i, c)[k] * weight[c][k];
             weight[i][k] = value / h(i, i)[k];
         }
-        if (steps[k] == 0) weight[0][k] = norm[k];  // below the tolerance from the start: its right side
+        if (steps[k] == 0)
+            weight[0][k] = norm[k];  // below the tolerance from the start: the solution is the right side
     }
     for (PerMode& w : weight)
         for (double& x : w) x = -x;
     result.solution.assign(size, DiscReal(0));
     subtract_all(result.solution, basis, weight.size(), stride, weight.data());
+    if (result.converged) return result;
+    const PerMode solved = square(result.solution, stride, stride);
+    const double first = std::abs(right[steps[0]][0]), others = std::accumulate(solved.begin() + 1, solved.end(), 0.0);
+    if (first > 0) result.left = first / std::sqrt(solved[0]);
+    if (unsolved > 0) result.left = std::max(result.left, std::sqrt(unsolved / others));
     return result;
 }
 

@@ -10,12 +10,11 @@
 namespace medulla::sim2d {
 namespace {
 
-const double pi = 3.14159265358979323846;
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 const int taps = 6;  ///< nodes of the interpolant in psi, even
 
-/// A value of the interpolant: node index (modulo mirror images) and the sign its image carries.
+/// A node of the interpolant: its index (modulo mirror images), the sign of its image and its position.
 struct Tap {
     std::ptrdiff_t node;
     double sign, at;
@@ -42,8 +41,8 @@ Matrix analyse(const double* psi, std::ptrdiff_t count, int part, std::size_t ha
         const double low = panel < 0 ? 0 : psi[panel], high = psi[panel + 1];
         // Points for a polynomial times a wave of n_max (high - low) radians.
         const int points = 4 + static_cast<int>(std::ceil(0.5 * highest * (high - low)));
-        const GaussRule rule = unit_gauss_rule(points);
-        // On the rim nothing comes in: a part ends at pi / 2 with a kink, where the stencil stops.
+        const Quadrature rule = unit_gauss_legendre(points);
+        // No light enters at the rim: a part has a kink at pi / 2, where the stencil stops.
         const std::ptrdiff_t middle = panel + 1 - taps / 2;
         const std::ptrdiff_t start = std::max(-count, rim ? std::min(middle, count - taps) : middle);
         Tap stencil[taps];
@@ -79,7 +78,7 @@ std::vector<DiscReal> rounded(const Matrix& matrix) {
     return values;
 }
 
-/// Radii cos x: steps of x from the rim, widening by a factor to the step of the inside, together pi / 2.
+/// Radii cos x: steps of x from the rim, each longer by a factor up to the interior step, pi / 2 in total.
 std::vector<double> radii(const DiscGridSize& size) {
     const double widest = pi / (2 * size.circles);
     std::vector<double> step;
@@ -100,7 +99,7 @@ std::vector<double> radii(const DiscGridSize& size) {
 
 }  // namespace
 
-DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : size(wanted) {
+DiscGrid::DiscGrid(double g, const DiscGridSize& wanted) : mean_cosine(g), size(wanted) {
     radius = radii(size);
     for (std::size_t i = 0; i < circles(); ++i) {
         const double inner = i == 0 ? 0 : radius[i - 1];

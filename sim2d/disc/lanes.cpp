@@ -17,7 +17,7 @@ const std::size_t block = 4;  ///< rows of a product that share their loads of b
 
 MEDULLA_CLONES void product(const DiscReal* a, std::size_t a_stride, const DiscReal* b, DiscReal* c, std::size_t rows,
                             std::size_t inner, std::size_t stride, std::size_t active) {
-    // Eight columns at a time, so that b's panel (inner x 8) stays in the first cache over all rows.
+    // Eight columns at a time, so that b's panel (inner x 8) stays in the first-level cache over all rows.
     for (std::size_t k = 0; k < active; k += 8) {
         std::size_t r = 0;
         for (; r + block <= rows; r += block) {

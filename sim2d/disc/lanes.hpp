@@ -1,5 +1,5 @@
-// Loops over the columns of the disc solver's rows: one column is one mode, columns never couple.
-// Nothing is contracted and sums keep their order, so every instruction set gives the same bits.
+// SIMD loops over the columns of the disc solver's rows: one column is one mode, and columns never couple.
+// Without contraction and with a fixed order of sums every instruction set gives the same bits.
 #pragma once
 
 #include <cstddef>

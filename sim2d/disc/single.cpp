@@ -9,8 +9,6 @@
 namespace medulla::sim2d {
 namespace {
 
-const double pi = 3.14159265358979323846;
-
 /// sqrt(1 - h^2) without cancellation at |h| = 1.
 double half_chord(double h) { return std::sqrt(std::max(0.0, (1 - h) * (1 + h))); }
 
@@ -21,8 +19,8 @@ struct Collisions {
 
 Collisions first_collision(double sigma, double h) {
     const double half = half_chord(h), tau = 2 * sigma * half;
-    // u^2 (3 - 2 u) gathers points at both ends, where d has square-root branch points.
-    static const GaussRule rule = unit_gauss_rule(40);
+    // u^2 (3 - 2 u) concentrates the points at both ends, where d has square-root branch points.
+    static const Quadrature rule = unit_gauss_legendre(40);
     Collisions c;
     double sum = 0;
     for (std::size_t i = 0; i < rule.nodes.size(); ++i) {
@@ -56,12 +54,12 @@ double escape(const Collisions& c, double sigma, double h, double phi) {
 }
 
 /// Gauss points for the integral over phi of p times a smooth function, in a bin of this width. The integrand's nearest
-/// singularity is the pole of p, -log|g| off the axis: r points converge like rho^-2r, rho = (pole + sqrt(pole^2 + 1))
-/// in units of half a bin. 2 points at least; aim at 1e-8.
-GaussRule rule_for(double g, double width) {
+/// singularity is the pole of p, at -log|g| from the real axis: r points converge like rho^-2r, rho = (pole +
+/// sqrt(pole^2 + 1)) in units of half a bin. At least 2 points; error about 1e-8.
+Quadrature rule_for(double g, double width) {
     const double pole = g == 0 ? 100 : std::min(100.0, -portable::log(std::abs(g)) * 2 / width);
     const double rho = pole + std::sqrt(pole * pole + 1);
-    return unit_gauss_rule(std::clamp(static_cast<int>(std::ceil(9.2 / portable::log(rho))), 2, 64));
+    return unit_gauss_legendre(static_cast<int>(std::clamp(std::ceil(9.2 / portable::log(rho)), 2.0, 64.0)));
 }
 
 }  // namespace
@@ -74,7 +72,7 @@ double disc_single_over_energy(double sigma, double g, double h, double phi) {
 
 std::vector<double> disc_single_lobe(double sigma, double g, double h, std::size_t bins) {
     const double width = 2 * pi / static_cast<double>(bins);
-    const GaussRule rule = rule_for(g, width);
+    const Quadrature rule = rule_for(g, width);
     const Collisions collisions = first_collision(sigma, h);
     std::vector<double> lobe(bins);
     for (std::size_t b = 0; b < bins; ++b) {
@@ -92,7 +90,7 @@ std::vector<double> disc_single_lobe(double sigma, double g, double h, std::size
 double disc_single_length(double sigma, double g, double h) {
     const int bins = 180;
     const double width = 2 * pi / bins, half = half_chord(h);
-    const GaussRule rule = rule_for(g, width);
+    const Quadrature rule = rule_for(g, width);
     const Collisions collisions = first_collision(sigma, h);
     double sum = 0;
     for (int b = 0; b < bins; ++b)

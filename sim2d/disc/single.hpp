@@ -1,5 +1,5 @@
 // Light scattered exactly once in the unit disc: the closed form of docs/physics.md, section 4, as bin averages.
-// Divided by the scattered energy E, so that sigma -> 0 and |h| -> 1 are ordinary values.
+// Relative to the scattered energy E, so that sigma -> 0 and |h| -> 1 are ordinary values.
 #pragma once
 
 #include <cstddef>

@@ -11,7 +11,7 @@
 namespace medulla::sim2d {
 namespace {
 
-/// High modes fade into denormals, which cost 100 cycles each: rounds them to zero while alive.
+/// High modes decay into denormals, which cost 100 cycles each: flushes them to zero in its lifetime.
 class FlushDenormals {
   public:
 #if defined(__SSE2__)
@@ -27,6 +27,10 @@ class FlushDenormals {
 #endif
 };
 
+/// Approximate norm of (1 - A)^-1: the expected number of further collisions, 2 sigma^2 (1 - g) / j^2 by diffusion of
+/// the slowest mode, j = 2.405 the first zero of J0, plus those of light that travels straight.
+double amplification(double g, double sigma) { return 1 + 2 * sigma + 0.346 * sigma * sigma * (1 - g); }
+
 /// Every row's column 0: to = a x + b y.
 void combine(DiscField& to, double a, const DiscField& x, double b, const DiscField& y, std::size_t stride) {
     for (std::size_t i = 0; i < to.size(); i += stride)
@@ -35,8 +39,8 @@ void combine(DiscField& to, double a, const DiscField& x, double b, const DiscFi
 
 }  // namespace
 
-DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a, double tolerance) {
-    const std::size_t stride = grid.stride;
+DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a, double tolerance, int most_steps) {
+    const std::size_t stride = grid.stride, most = static_cast<std::size_t>(most_steps);
     const FlushDenormals flush;
     const double extinction = sigma + sigma_a;
     DiscTransport transport(grid, extinction);
@@ -49,13 +53,14 @@ DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a
         transport.stream(in, radiance, active);
         transport.scatter(radiance, out, active, sigma);
     };
-    const DiscIteration many = gmres(collide, std::move(source), stride, tolerance);
+    const DiscIteration many = gmres(collide, std::move(source), stride, tolerance, most);
 
     std::vector<DiscReal> rows(2 * grid.offset.size() * stride);
     transport.stream(many.solution, radiance, stride, rows.data());
     DiscExit exit;
     exit.iterations = many.iterations;
     exit.residual = many.residual;
+    exit.unconverged = many.left * amplification(grid.mean_cosine, sigma);
     exit.offset = grid.offset;
     exit.modes = stride - 1;
     for (std::size_t m = 0; m + 1 < grid.offset.size(); ++m) {
@@ -85,7 +90,8 @@ DiscExit solve_disc_transport(const DiscGrid& grid, double sigma, double sigma_a
     transport.scatter(twice, lengths, first, 1);
     for (std::size_t i = 0; i < lengths.size(); ++i)
         if (i % stride > 0) lengths[i] = 0;
-    const DiscIteration one = gmres(collide, std::move(lengths), stride, tolerance);
+    const DiscIteration one = gmres(collide, std::move(lengths), stride, tolerance, most);
+    exit.unconverged = std::max(exit.unconverged, one.left * amplification(grid.mean_cosine, sigma));
     combine(radiance, 1, one.solution, -sigma_a, flown, stride);
     DiscField source_of_lengths = radiance;
     transport.stream(source_of_lengths, radiance, first, rows.data());

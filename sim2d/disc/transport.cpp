@@ -10,10 +10,9 @@
 namespace medulla::sim2d {
 namespace {
 
-const double pi = 3.14159265358979323846;
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// integral over u in (0, 1) of exp(-tau (1 - u)) u^j du, j < disc_taps: by recurrence in the direction that is stable.
+/// integral over u in (0, 1) of exp(-tau (1 - u)) u^j du, j < disc_taps, by recurrence in its stable direction.
 void exponential_moments(double tau, double moment[disc_taps]) {
     if (tau > 2) {
         moment[0] = -portable::expm1(-tau) / tau;
@@ -27,7 +26,7 @@ void exponential_moments(double tau, double moment[disc_taps]) {
     for (int j = last; j > 0; --j) moment[j - 1] = (1 - tau * moment[j]) / j;
 }
 
-/// Way from the rim to the point at radius r against a direction at the angle psi from its place, >= 0.
+/// Distance from the rim to a point at radius r along a direction at the angle psi to its position, >= 0.
 double way_from_rim(double r, double cosine) {
     const double x = r * cosine, inside = (1 - r) * (1 + r), root = std::sqrt(inside + x * x);
     return x < 0 ? inside / (root - x) : root + x;
@@ -105,7 +104,7 @@ void DiscTransport::scatter(const DiscField& radiance, DiscField& source, std::s
 }
 
 /// Unscattered light at radius r is delta(omega) exp(-extinction d(psi)): a_m = f_m for every k, f the Fourier
-/// coefficients of the exponential; and then it is scattered.
+/// coefficients of the exponential; scattering follows.
 void DiscTransport::first_collision(DiscField& source) {
     const std::size_t stride = grid_.stride, orders = grid_.all_harmonics();
     const auto top = static_cast<Eigen::Index>(2 * orders);
@@ -166,7 +165,7 @@ std::complex<double> DiscTransport::grazing(const DiscField& source, std::size_t
 void DiscTransport::chord(std::size_t m, const DiscField& source, DiscField& radiance, std::size_t active,
                           DiscReal* exit) {
     const std::size_t ring = grid_.ring[m], met = grid_.circles() - ring, stride = grid_.stride;
-    const std::size_t out = met - grid_.tangent(m);  // the point of touch is both on the way in and on the way out
+    const std::size_t out = met - grid_.tangent(m);  // the tangent point belongs to the way in and to the way out
     const auto at = [&](std::size_t p, int imaginary) {
         return &along_[(2 * p + static_cast<std::size_t>(imaginary)) * stride];
     };
@@ -176,7 +175,7 @@ void DiscTransport::chord(std::size_t m, const DiscField& source, DiscField& rad
             lanes::sum_difference(&source[row(ring + c, sums[part], m) * stride],
                                   &source[row(ring + c, differences[part], m) * stride], DiscReal(1), at(out + c, part),
                                   at(met - 1 - c, part), active);
-    // March from the rim, where nothing comes in. The radiance on the way in waits in the sum rows for the way out.
+    // March from the rim, where no light enters. The sum rows store the radiance on the way in for the way out.
     std::fill(flux_.begin(), flux_.end(), DiscReal(0));
     for (std::size_t p = 0; p < out + met; ++p) {
         for (int part = 0; part < 2; ++part) {

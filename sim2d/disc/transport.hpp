@@ -13,7 +13,7 @@ namespace medulla::sim2d {
 /// Columns at all nodes: circle by circle, the four parts one after the other, each chords(i) x stride, row-major.
 using DiscField = std::vector<DiscReal>;
 
-const int disc_taps = 6;  ///< points of a chord that a source is interpolated from
+const int disc_taps = 6;  ///< points of a chord from which a source is interpolated
 
 class DiscTransport {
   public:
@@ -22,12 +22,12 @@ class DiscTransport {
 
     std::size_t size() const { return grid_.nodes() * disc_parts * grid_.stride; }
 
-    /// Radiance from a source, columns [0, active); `exit`, where given, takes the radiance that leaves along each
-    /// chord: a real and an imaginary row per chord.
+    /// Radiance from a source, columns [0, active); `exit`, if not null, receives the exit radiance of each chord:
+    /// a real and an imaginary row per chord.
     void stream(const DiscField& source, DiscField& radiance, std::size_t active, DiscReal* exit = nullptr);
     /// The convolution of the radiance with the phase function times `factor`, at every node.
     void scatter(const DiscField& radiance, DiscField& source, std::size_t active, double factor);
-    /// p(omega) exp(-extinction d): what a plane wave of unit radiance scatters, over the scattering coefficient.
+    /// p(omega) exp(-extinction d): source of a plane wave of unit radiance, relative to the scattering coefficient.
     void first_collision(DiscField& source);
     /// Column 0 of a radiance becomes (1 - exp(-extinction d)) / extinction, that of a uniform unit source.
     void uniform_radiance(DiscField& radiance) const;

@@ -22,10 +22,10 @@ void check(double sigma, double g, std::size_t bins, const TraceOptions& options
     require(options.paths > 0 && options.paths <= std::uint64_t{1} << 40, "paths: expected 1 to 2^40");
 }
 
-/// Free flight with collision density sigma exp(-sigma t). sigma = 0 flies for ever.
+/// Free flight with collision density sigma exp(-sigma t); infinite for sigma = 0.
 double free_flight(double sigma, RandomStream& random) { return -portable::log(random.uniform()) / sigma; }
 
-/// First flight conditioned to collide within `length`: t = -log(1 - u (1 - exp(-sigma L))) / sigma -> u L.
+/// First flight, conditioned on a collision within `length`: t = -log(1 - u (1 - exp(-sigma L))) / sigma -> u L.
 double forced_flight(double sigma, double length, RandomStream& random) {
     const double u = random.uniform(), tau = sigma * length;
     if (!(tau > 0)) return u * std::min(length, std::numeric_limits<double>::max());
@@ -48,7 +48,7 @@ void advance(Ray& ray, double t) { ray.x += t * ray.direction.x, ray.y += t * ra
 
 void scatter(Ray& ray, double g, RandomStream& random) {
     ray.direction = rotate(ray.direction, sample_planar_hg(random.direction(), g));
-    // One Newton step keeps the length of the direction at 1 however long the walk.
+    // One Newton step keeps the length of the direction at 1 however long the path.
     const double n = 1.5 - 0.5 * (ray.direction.x * ray.direction.x + ray.direction.y * ray.direction.y);
     ray.direction = {ray.direction.x * n, ray.direction.y * n};
 }
@@ -59,17 +59,17 @@ std::size_t bin_of(double angle, double low, double high, std::size_t bins) {
     return static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(b, 0, static_cast<std::ptrdiff_t>(bins) - 1));
 }
 
-/// Standard error of a share of n trials. Half a count more on either side (Jeffreys' prior): 0 or n hits of n are not
-/// certainty.
+/// Standard error of a fraction of n trials. Jeffreys' prior adds half a count on either side, since 0 or n hits do not
+/// mean certainty.
 double share_error(double hits, double n) {
     const double q = (hits + 0.5) / (n + 1);
     return std::sqrt(q * (1 - q) / n);
 }
 
-/// Its square is above 0 still, so that a lobe exists for every absorption; nothing shows of it otherwise.
+/// Smallest weight. Its square does not underflow, so that every absorption has a lobe; it has no visible effect.
 constexpr double kLeastWeight = 1e-150;
 
-/// Sums over paths of weight w <= 1, one of them per exit: of w, w^2 and w times the length.
+/// Sums over paths of weight w <= 1: of w and w^2 per exit bin and in total, and of w times the length.
 struct Weights {
     explicit Weights(std::size_t bins) : sum(bins, 0), square(bins, 0) {}
     std::vector<double> sum, square;
@@ -80,7 +80,7 @@ struct Weights {
         total += w, squares += w * w, length += w * path_length, ++paths;
     }
 
-    /// Density, error and mean length; the energy is the caller's.
+    /// Density, error and mean length; the caller sets the energy.
     Profile profile(double width) const {
         Profile p;
         p.standard_error = 1;
@@ -91,7 +91,7 @@ struct Weights {
             if (sum[b] > 0) variance += sum[b] * (square[b] / sum[b] - sum[b] / paths);
             norm += sum[b] * sum[b];
         }
-        p.standard_error = std::sqrt(variance / norm);
+        p.standard_error = std::sqrt(std::max(0.0, variance) / norm);
         p.mean_length = length / total;
         return p;
     }
@@ -99,7 +99,7 @@ struct Weights {
 
 }  // namespace
 
-Exit walk_disc(Ray ray, double sigma, double g, RandomStream& random) {
+Exit follow_path(Ray ray, double sigma, double g, RandomStream& random) {
     Exit exit{ray, 0, 0};
     for (;;) {
         const double t = free_flight(sigma, random), d = distance_to_circle(exit.ray);
@@ -134,7 +134,7 @@ std::vector<Profile> trace_disc(double sigma, double g, double h, const std::vec
         Ray ray{-half, h, {1, 0}};
         advance(ray, t);
         scatter(ray, g, random);
-        const Exit exit = walk_disc(ray, sigma, g, random);
+        const Exit exit = follow_path(ray, sigma, g, random);
         const double phi = portable::atan2(exit.ray.direction.y, exit.ray.direction.x), length = t + exit.length;
         const std::size_t bin = bin_of(phi, -pi, pi, bins);
         for (std::size_t j = 0; j < weights.size(); ++j)
@@ -142,7 +142,7 @@ std::vector<Profile> trace_disc(double sigma, double g, double h, const std::vec
                            absorption[j] > 0 ? std::max(portable::exp(-absorption[j] * length), kLeastWeight) : 1);
     }
     const double width = 2 * pi / static_cast<double>(bins), n = static_cast<double>(options.paths);
-    const double scattered = -portable::expm1(-sigma * chord);  // the share that forced paths stand for
+    const double scattered = -portable::expm1(-sigma * chord);  // the fraction that forced paths represent
     std::vector<Profile> profiles;
     for (std::size_t j = 0; j < weights.size(); ++j) {
         const Weights& w = weights[j];
@@ -159,7 +159,7 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
     check(sigma, g, bins_per_side, options);
     require(theta_i >= -pi / 2 && theta_i <= pi / 2, "theta_i: expected a value in [-pi/2, pi/2]");
     // x is the depth below the lit face; the light travels along (cos theta_i, -sin theta_i), so that it comes from
-    // inclination theta_i. It leaves at theta_r = asin(direction.y): the straight continuation is theta_r = -theta_i.
+    // inclination theta_i. It leaves at theta_r = asin(direction.y); straight through is theta_r = -theta_i.
     const double mu = theta_i == pi / 2 || theta_i == -pi / 2 ? 0.0 : portable::cos(theta_i);
     const double chord = mu > 0 ? 2 / mu : std::numeric_limits<double>::infinity();
     Weights back(bins_per_side), forward(bins_per_side);
@@ -176,7 +176,7 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
             const double c = ray.direction.x;
             const double to_face = c > 0 ? (2 - x) / c : (c < 0 ? -x / c : std::numeric_limits<double>::infinity());
             if (!(t < to_face)) {
-                // c = 0 and sigma = 0: the ray never leaves; it has probability 0, and an exit angle of +-90 degrees.
+                // c = 0 and sigma = 0: the ray never leaves. It has probability 0; its exit angle is +-90 degrees.
                 length += std::min(to_face, std::numeric_limits<double>::max());
                 const double theta_r = portable::atan2(ray.direction.y, std::abs(c));
                 (c < 0 ? back : forward).add(bin_of(theta_r, -pi / 2, pi / 2, bins_per_side), length);
@@ -196,7 +196,7 @@ SlabProfile trace_slab(double sigma, double g, double theta_i, std::size_t bins_
         p.energy = count / scattered * total;
         p.energy_error = forced ? total * share_error(count, n) : share_error(count, n);
     };
-    // In an empty slab directions along it have no end: the mean of 1 / cos diverges.
+    // In an empty slab directions along the surface never leave: the mean of 1 / cos diverges.
     if (!(sigma > 0)) profile.back.mean_length = profile.forward.mean_length = std::numeric_limits<double>::infinity();
     share(profile.back, back.total);
     share(profile.forward, forward.total);

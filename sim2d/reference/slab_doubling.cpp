@@ -14,20 +14,19 @@ namespace medulla::sim2d {
 SlabDoubling slab_doubling(double sigma, double g, std::size_t directions, double absorption) {
     using Eigen::Index;
     using Eigen::MatrixXd;
-    constexpr double half_pi = 1.57079632679489661923;
     // Layers of at most 5e-7: the box error (h / mu)^2 / 12 is below 1e-8 for mu > 2e-3, rounding grows as eps
     // 2^doublings.
-    const int doublings = std::max(0, int(std::ceil(std::log2(2 * sigma / 5e-7))));
-    const GaussLegendre rule = gauss_legendre(directions);
+    const int doublings = sigma > 2.5e-7 ? int(std::ceil(std::log2(2 * sigma / 5e-7))) : 0;
+    const Quadrature rule = gauss_legendre(directions);
     const Index n = Index(directions);
     SlabDoubling result;
-    for (double x : rule.node) result.theta.push_back(half_pi * x);
+    for (double x : rule.nodes) result.theta.push_back(pi / 2 * x);
     Eigen::VectorXd mu(n), weight(n);
     MatrixXd within(n, n), across(n, n);
     for (Index i = 0; i < n; ++i) {
         const double a = result.theta[std::size_t(i)];
         mu(i) = portable::cos(a);
-        weight(i) = half_pi * rule.weight[std::size_t(i)];
+        weight(i) = pi / 2 * rule.weights[std::size_t(i)];
         result.weight.push_back(weight(i));
         for (Index j = 0; j < n; ++j) {
             const double b = result.theta[std::size_t(j)];  // travel directions b and pi - b

@@ -1,5 +1,6 @@
-// Directions of the slab solver: quadrature nodes graded to grazing, and the bins with their inner quadrature points.
-// Gauss-Legendre in t on (-1, 1) with theta = (pi/2) m(t), m = (7 t - t^7) / 6: m' = 0 at the ends, nearly even inside.
+// Directions of the slab solver: quadrature nodes graded towards grazing, and quadrature points inside the bins.
+// Gauss-Legendre in t on (-1, 1) with theta = (pi/2) m(t), m = (7 t - t^7) / 6: m' = 0 at the ends, nearly uniform
+// inside.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +14,7 @@ namespace medulla::sim2d {
 struct SlabDirections {
     std::vector<double> t;            ///< node of the Gauss rule, in (0, 1)
     std::vector<double> theta;        ///< inclination [radians]
-    std::vector<double> mu;           ///< cosine, from the distance to pi/2: relative precision at grazing
+    std::vector<double> mu;           ///< cosine, computed from pi/2 - theta: keeps its relative precision at grazing
     std::vector<double> weight;       ///< of the integral over theta; the N weights sum to pi/2
     std::vector<double> barycentric;  ///< weights of the Lagrange interpolation in t through all 2N nodes
 };
@@ -40,7 +41,7 @@ struct SlabBins {
     std::vector<double> theta, mu, weight;   ///< weight: of the integral over theta
     std::vector<double> sin_half, cos_half;  ///< of theta / 2
 };
-/// @param g sets how many points a bin needs for the phase function's peak
+/// @param g decides how many points a bin needs for the phase function's peak
 SlabBins slab_bins(std::size_t count, double g);
 
 }  // namespace medulla::sim2d

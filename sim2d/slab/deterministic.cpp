@@ -22,29 +22,29 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kUsualBins = 360;
 
-/// Below this sigma the lobes are their limit to double precision: the deviation is O(sigma log sigma) / bin width.
+/// Below this sigma lobes equal their limit in double precision: the difference is O(sigma log sigma) / bin width.
 constexpr double kThin = 1e-30;
 
-/// Depth below which the grazing directions that light still scatters from, mu of about the depth, are too few. Paths
-/// go to their limit from there: their distance from it falls as depth log^2(depth) to 15 %, measured: 1e-4 of a path.
+/// In thinner slabs too few directions resolve the grazing angles (mu of about the depth) from which light still
+/// scatters. There paths are extrapolated to their limit, from which they differ as depth log^2(depth), to 15 % of the
+/// difference: 1e-4 of a path (tests/test_slab_paths.cpp).
 constexpr double kThinDepth = 3e-4;
 
 /// Directions per quarter circle. The phase function's poles lie d = -log|g| off the real axis, at the normal
-/// d / (1.167 pi / 2) in t, so the 2N-point rule errs by exp(-2.18 d N) = 1e-9 at 9.5 / d. At least 64: thin layers
-/// and the logarithms at grazing need them whatever g is.
+/// d / (1.167 pi / 2) in t, so the error of the 2N-point rule is exp(-2.18 d N) = 1e-9 at N = 9.5 / d. At least 64, for
+/// thin layers and the logarithms at grazing.
 double directions_wanted(double g) {
     return g == 0 ? 64 : std::max(64.0, std::ceil(-9.5 / portable::log(std::abs(g))));
 }
 
-/// The g whose bins integrate the interpolated light: twice scattered peaks have their poles at least twice as far, and
-/// no interpolant is sharper than the directions' spacing.
+/// The g that sets the bins' points for interpolated light: peaks of light scattered twice have poles at least twice as
+/// far from the real axis, and no interpolant is sharper than the spacing of the directions.
 double smooth_g(double g) { return std::min(g * g, 0.97); }
 
-/// Rounding of the singular values against mu: measured below 7e-9 of a lobe for |g| <= 0.97, worst at theta_i = 90
-/// degrees, where light scatters on the surface and excites the grazing modes.
+/// Relative L2 error of a lobe from rounding of the singular values: below 7e-9 for |g| <= 0.97 against
+/// slab_doubling, worst at theta_i = 90 degrees, where light scatters at the surface and excites the grazing modes.
 constexpr double kRounding = 1e-8;
 
 /// Interpolation from the nodes of one resolution to the points of the bins, even and odd.
@@ -59,19 +59,13 @@ Rows interpolation_rows(const SlabOrdinates& ordinates, const std::vector<double
     for (const int parity : {0, 1}) {
         rows.parity[parity].resize(Index(theta.size()), Index(n));
         for (std::size_t r = 0; r < theta.size(); ++r) {
-            const double t = ordinates.interpolation() == Interpolation::spectral ? slab_t_of(kPi / 2 - theta[r]) : 0;
+            const double t = ordinates.interpolation() == Interpolation::spectral ? slab_t_of(pi / 2 - theta[r]) : 0;
             slab_interpolation_row(ordinates.directions(), t, theta[r], parity == 0 ? Parity::even : Parity::odd,
                                    ordinates.interpolation(), row.data());
             rows.parity[parity].row(Index(r)) = Eigen::Map<const Eigen::RowVectorXd>(row.data(), Index(n));
         }
     }
     return rows;
-}
-
-/// p(t; g) from sin(t/2) and cos(t/2), see planar_hg_pdf.
-double phase_of_half(double sin_half, double cos_half, double g) {
-    const double half = g < 0 ? cos_half : sin_half, a = std::abs(g), d = 1 - a;
-    return d * (1 + a) / (2 * kPi * (d * d + 4 * a * half * half));
 }
 
 /// Raw lobes of every incident angle (columns) over the bins, in the frame of light that travels towards +theta_i.
@@ -92,14 +86,14 @@ RawLobes single_scattering(const SlabBins& bins, double g, double depth, const s
                 const double s_plus = sr * ci + cr * si, c_plus = cr * ci - sr * si;
                 const double back = bins.weight[r] * slab_back_factor(depth, mu_i, bins.mu[r]);
                 const double forward = bins.weight[r] * slab_forward_factor(depth, mu_i, bins.mu[r]);
-                raw.forward(Index(group.upper), i) += forward * phase_of_half(s_minus, c_minus, g);
-                raw.forward(Index(group.lower), i) += forward * phase_of_half(s_plus, c_plus, g);
-                raw.back(Index(group.upper), i) += back * phase_of_half(s_plus, c_plus, -g);
-                raw.back(Index(group.lower), i) += back * phase_of_half(s_minus, c_minus, -g);
+                raw.forward(Index(group.upper), i) += forward * portable::planar_hg_pdf_of_half(s_minus, c_minus, g);
+                raw.forward(Index(group.lower), i) += forward * portable::planar_hg_pdf_of_half(s_plus, c_plus, g);
+                raw.back(Index(group.upper), i) += back * portable::planar_hg_pdf_of_half(s_plus, c_plus, -g);
+                raw.back(Index(group.lower), i) += back * portable::planar_hg_pdf_of_half(s_minus, c_minus, -g);
             }
         }
     }
-    const double per_bin = double(bins.count) / kPi;
+    const double per_bin = double(bins.count) / pi;
     raw.back *= per_bin;
     raw.forward *= per_bin;
     return raw;
@@ -112,7 +106,7 @@ RawLobes multiple_scattering(const SlabBins& bins, const Rows& rows, const SlabO
     RawLobes raw{MatrixXd::Zero(Index(bins.count), count), MatrixXd::Zero(Index(bins.count), count)};
     Eigen::VectorXd weight(Index(bins.theta.size()));
     for (std::size_t r = 0; r < bins.theta.size(); ++r) {
-        weight(Index(r)) = bins.weight[r] * -portable::expm1(-depth / bins.mu[r]) * double(bins.count) / kPi;
+        weight(Index(r)) = bins.weight[r] * -portable::expm1(-depth / bins.mu[r]) * double(bins.count) / pi;
     }
     MatrixXd average(Index(bins.groups.size()), n);
     for (const int parity : {0, 1}) {
@@ -146,10 +140,10 @@ std::vector<SlabSides> paths(const SlabOrdinates& ordinates, double g, double si
     std::vector<SlabSides> all;
     for (std::size_t i = 0; i < theta_i.size(); ++i) {
         SlabSides sides = slab_single_paths(sigma, g, theta_i[i]);
-        // Light scattered into mu < depth flies a mean free path and scatters to either side: 1 radius over all mu,
-        // from each direction along the surface, however thin the slab.
+        // Light scattered into mu < depth travels a mean free path and scatters to either side. Over all mu that adds
+        // 1 radius for each direction along the surface, however thin the slab.
         const double limit =
-            portable::planar_hg_pdf(kPi / 2 - theta_i[i], g) + portable::planar_hg_pdf(kPi / 2 + theta_i[i], g);
+            portable::planar_hg_pdf(pi / 2 - theta_i[i], g) + portable::planar_hg_pdf(pi / 2 + theta_i[i], g);
         sides.back += limit + left * (back(Index(i)) - limit);
         sides.forward += limit + left * (forward(Index(i)) - limit);
         all.push_back(sides);
@@ -159,14 +153,14 @@ std::vector<SlabSides> paths(const SlabOrdinates& ordinates, double g, double si
 
 /// sigma -> 0: p over its integral on each side (path factors tend to depth / mu_i on both), light towards -theta_i.
 SlabProfile thin_limit(double g, double theta_i, std::size_t bins, double energy, const SlabSides& path) {
-    const double w = kPi / double(bins);
+    const double w = pi / double(bins);
     SlabProfile limit;
     limit.back.lobe.resize(bins);
     limit.forward.lobe.resize(bins);
-    const double back = planar_hg_integral(-kPi / 2 - theta_i, kPi / 2 - theta_i, -g);
-    const double forward = planar_hg_integral(-kPi / 2 + theta_i, kPi / 2 + theta_i, g);
+    const double back = planar_hg_integral(-pi / 2 - theta_i, pi / 2 - theta_i, -g);
+    const double forward = planar_hg_integral(-pi / 2 + theta_i, pi / 2 + theta_i, g);
     for (std::size_t i = 0; i < bins; ++i) {
-        const double lo = -kPi / 2 + double(i) * w, hi = lo + w;
+        const double lo = -pi / 2 + double(i) * w, hi = lo + w;
         limit.back.lobe[i] = planar_hg_integral(lo - theta_i, hi - theta_i, -g) / (w * back);
         limit.forward.lobe[i] = planar_hg_integral(lo + theta_i, hi + theta_i, g) / (w * forward);
     }
@@ -182,7 +176,7 @@ double relative_difference(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
 
 void check_angles(const std::vector<double>& theta) {
     for (double t : theta) {
-        if (!(std::abs(t) <= kPi / 2)) throw std::invalid_argument("slab: angle outside [-pi/2, pi/2]");
+        if (!(std::abs(t) <= pi / 2)) throw std::invalid_argument("slab: angle outside [-pi/2, pi/2]");
     }
 }
 
@@ -208,7 +202,7 @@ SlabSolver::SlabSolver(double g, const SlabOptions& options) : state_(std::make_
     const std::size_t n = std::max<std::size_t>(4, std::min(std::size_t(wanted), options.max_directions));
     state_->g = g;
     state_->options = options;
-    // Half of the wanted directions still give the kernel's integrals to 3e-5 and a positive interpolant.
+    // With half of the wanted directions the kernel's integrals have errors of 3e-5, and the interpolant is positive.
     state_->resolved = double(n) >= directions_wanted(g) / 2;
     state_->resolutions.emplace_back(g, n, state_->resolved);
     if (options.estimate_error) state_->resolutions.emplace_back(g, n * 4 / 5, state_->resolved);
@@ -251,10 +245,10 @@ std::vector<SlabProfile> SlabSolver::solve(double sigma, const std::vector<doubl
     const SlabBins own_smooth = usual ? SlabBins{} : slab_bins(bins_per_side, smooth_g(state_->g));
     const SlabBins& bins = usual ? state_->bins : own;
     const SlabBins& smooth_bins = usual ? state_->smooth_bins : own_smooth;
-    // From 0.8 N to N directions an error e of first order in 1/N falls by e / 4: the cell averages' order at worst.
-    // Resolved errors fall exponentially, so there the difference is itself the bound.
+    // Unresolved errors are at worst of first order in 1 / N (cell averages): the fine error is 4 times the difference
+    // of 0.8 N and N directions. Resolved errors fall exponentially, so that the difference itself is a bound.
     const double order = state_->resolved ? 1 : 4;
-    const double depth = 2 * sigma, w = kPi / double(bins_per_side);
+    const double depth = 2 * sigma, w = pi / double(bins_per_side);
     const RawLobes single = single_scattering(bins, state_->g, depth, incident);
     std::vector<RawLobes> raw;
     for (std::size_t r = 0; r < state_->resolutions.size(); ++r) {
@@ -284,7 +278,7 @@ std::vector<SlabProfile> SlabSolver::solve(double sigma, const std::vector<doubl
             const auto coarse = (raw[1].*side).col(Index(i));
             profile.standard_error =
                 order * relative_difference(lobe / raw_energy, coarse / (coarse.sum() * w)) + kRounding;
-            // What one side loses by rounding the other gains, and neither more than the smaller one holds.
+            // Rounding moves energy from one side to the other, at most what the smaller one has.
             const double smaller = std::min(raw_energy, std::abs(both - raw_energy));
             profile.energy_error =
                 order * std::abs(raw_energy - coarse.sum() * w) + std::abs(both - total) + kRounding * smaller;

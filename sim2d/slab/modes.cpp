@@ -1,5 +1,5 @@
-// Discrete ordinates by eigen-modes; the phase function is sampled where the directions resolve it, averaged over
-// the directions' cells where they do not, and its diagonal restores energy exactly in both cases.
+// Discrete ordinates by eigen-modes. The phase function is sampled where the directions resolve it and averaged over
+// their cells where they do not; in both cases its diagonal is corrected so that energy is conserved exactly.
 #include "sim2d/slab/modes.hpp"
 
 #include <algorithm>
@@ -16,8 +16,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kPi = 3.14159265358979323846;
-
 /// Scattering from inclination b to a: forward p(a - b), across p(pi - a - b). `across` as p(a + b; -g).
 double phase(double difference, double g, bool across) { return portable::planar_hg_pdf(difference, across ? -g : g); }
 
@@ -25,7 +23,7 @@ double phase(double difference, double g, bool across) { return portable::planar
 
 SlabOrdinates::SlabOrdinates(double g, std::size_t count, bool resolved)
     : g_(g), resolved_(resolved), directions_(slab_directions(count)) {
-    cell_edge_.push_back(kPi / 2);
+    cell_edge_.push_back(pi / 2);
     for (double w : directions_.weight) cell_edge_.push_back(cell_edge_.back() - w);
     cell_edge_.back() = 0;  // the weights sum to pi/2
     modes_[0] = decompose(Parity::even);
@@ -60,7 +58,7 @@ SlabModes SlabOrdinates::decompose(Parity parity) const {
     const VectorXd weight = Eigen::Map<const VectorXd>(d.weight.data(), n), root = weight.cwiseSqrt();
     const VectorXd mu = Eigen::Map<const VectorXd>(d.mu.data(), n);
 
-    MatrixXd within(n, n), across(n, n);  // even and odd in theta need the direct and the mirrored term apart
+    MatrixXd within(n, n), across(n, n);  // parts even and odd in theta combine the direct and the mirrored term
     MatrixXd within_mirror(n, n), across_mirror(n, n);
     for (Index i = 0; i < n; ++i) {
         for (Index j = 0; j < n; ++j) {
@@ -72,10 +70,10 @@ SlabModes SlabOrdinates::decompose(Parity parity) const {
         }
     }
     for (MatrixXd* m : {&within, &within_mirror, &across, &across_mirror}) {
-        *m = (0.5 * (*m + m->transpose())).eval();  // a no-op for samples; makes cell averages reciprocal
+        *m = (0.5 * (*m + m->transpose())).eval();  // no change for samples; makes cell averages reciprocal
     }
-    // Each row must integrate to 1. What is missing belongs to the peak: the same direction for g > 0, the reversed
-    // one (across, mirrored) for g < 0.
+    // Each row must integrate to 1. The defect belongs to the peak: the same direction for g > 0, the reversed one
+    // (across, mirrored) for g < 0.
     const VectorXd missing = VectorXd::Ones(n) - (within + within_mirror + across + across_mirror) * weight;
     (g_ < 0 ? across_mirror : within).diagonal() += missing.cwiseQuotient(weight);
 
@@ -90,8 +88,9 @@ SlabModes SlabOrdinates::decompose(Parity parity) const {
     modes.conservative = parity == Parity::even;
     if (modes.conservative) {
         // X has the null vector e = sqrt(weight). All other modes are orthogonal to q = M Y^-1 M e, so X + a q q^T
-        // has them unchanged and e with k^2 = a e.q. The others obey k^2 >= min X min Y = (1 - g^2)(1 - max(g, 0));
-        // a quarter of that sorts mode 0 first, without spreading the singular values.
+        // leaves them unchanged and gives e the eigenvalue k^2 = a e.q. The others obey
+        // k^2 >= min X min Y = (1 - g^2)(1 - max(g, 0)); a quarter of that sorts mode 0 first, without spreading the
+        // singular values.
         const VectorXd q = mu.asDiagonal() * y_factor.solve(VectorXd(mu.cwiseProduct(root)));
         const double k2 = (1 - g_ * g_) * (1 - std::max(g_, 0.0)) / 4;
         x += (k2 / root.dot(q)) * q * q.transpose();
@@ -101,8 +100,7 @@ SlabModes SlabOrdinates::decompose(Parity parity) const {
     MatrixXd b = x_factor.matrixL().solve(MatrixXd(mu.asDiagonal()));
     b = y_factor.matrixL().solve(MatrixXd(b.transpose())).transpose().eval();
     const Eigen::BDCSVD<MatrixXd> svd(b, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    // X, Y <= 2 bound the singular values by min(mu) / 2 from below; where eps max(1/k) exceeds that, they are
-    // rounding.
+    // X, Y <= 2 bound the singular values by min(mu) / 2 from below; smaller ones are rounding.
     modes.k = svd.singularValues().cwiseMax(mu.minCoeff() / 2).cwiseInverse();
     const MatrixXd s = x_factor.matrixU().solve(svd.matrixU());
     const MatrixXd t = y_factor.matrixU().solve(svd.matrixV());
@@ -149,12 +147,11 @@ class Ends {
         antisymmetric_.compute(antisymmetric);
     }
 
-    /// y of the field that isotropic light of radiance 1 on the far side less such light on the near side makes: x is
-    /// 0.
+    /// y of the field of isotropic light of radiance 1 on the far side and -1 on the near side; its x is 0.
     VectorXd tilted() const { return antisymmetric_.solve(VectorXd::Constant(m_.k.size(), -4)); }
 
-    /// What leaves where nothing enters, of a source whose particular solution starts from nothing: alpha at depth,
-    /// beta at 0; mode 0's A and B at depth where conservative (its alpha and beta are 0).
+    /// Exit radiance of a source inside, without incident light. Its particular solution starts at 0; given are its
+    /// alpha at depth and beta at 0, and for a conservative mode 0 (whose alpha and beta are 0) A and B at depth.
     Radiance leaving(const MatrixXd& alpha, const MatrixXd& beta, const Eigen::RowVectorXd& a_end,
                      const Eigen::RowVectorXd& b_end) const {
         const MatrixXd outward = m_.sum - m_.difference;
@@ -188,7 +185,7 @@ Radiance exit_radiance(const SlabModes& m, double depth, const std::vector<doubl
                        const MatrixXd& minus) {
     const Index n = m.k.size(), count = plus.cols();
     const MatrixXd c_sum = m.project_sum * (plus + minus), c_difference = m.project_difference * (plus - minus);
-    // alpha(depth) and beta(0) of the particular solution that starts from nothing are slab path factors at mu = 1/k.
+    // alpha(depth) and beta(0) of the particular solution that starts at 0 are slab path factors at mu = 1/k.
     MatrixXd alpha(n, count), beta(n, count);
     for (Index i = 0; i < count; ++i) {
         const double mu = mu_i[std::size_t(i)];
@@ -203,8 +200,8 @@ Radiance exit_radiance(const SlabModes& m, double depth, const std::vector<doubl
         a_end.resize(count), b_end.resize(count);
         for (Index i = 0; i < count; ++i) {
             const double mu = mu_i[std::size_t(i)], fed = mu > 0 ? -portable::expm1(-depth / mu) : 1;
-            // Integral of 1 - exp(-tau / mu) over the depth; the difference loses digits only where it is itself
-            // small against depth * fed, beside which it is added.
+            // Integral of 1 - exp(-tau / mu) over the depth. The difference loses digits only where it is small against
+            // depth * fed, to which it is added.
             const double fed_twice = mu > 0 ? depth - mu * fed : depth;
             b_end(i) = c_sum(0, i) * fed;
             a_end(i) = -m.k(0) * c_sum(0, i) * fed_twice + c_difference(0, i) * fed;
@@ -269,8 +266,8 @@ SlabOrdinates::Paths SlabOrdinates::multiply_scattered_paths(double depth) const
     const Index n = m.k.size();
     const Ends ends(m, depth);
 
-    // Two sources: radiance 1 everywhere, the chances of both sides together, and the chance of the far side less that
-    // of the near one, backwards: alpha = y/2 exp(-k tau), beta = -y/2 exp(-k (depth - tau)), mode 0 of slope -k y.
+    // Two sources: radiance 1 everywhere, the sum of the probabilities of both sides, and the reversed difference of
+    // the far and the near side: alpha = y/2 exp(-k tau), beta = -y/2 exp(-k (depth - tau)), mode 0 of slope -k y.
     MatrixXd alpha(n, 2), beta(n, 2);
     Eigen::RowVector2d a_end, b_end;
     const VectorXd constant = m.project_sum * VectorXd::Constant(n, 2);
@@ -302,7 +299,7 @@ SlabOrdinates::Paths SlabOrdinates::multiply_scattered_paths(double depth) const
     alpha.row(0).setZero(), beta.row(0).setZero();
     const MatrixXd all = ends.leaving(alpha, beta, a_end, b_end).back;
 
-    // Less what did not scatter, or once. mu times a factor is the same for the way there and back.
+    // Subtract unscattered and singly scattered light. mu times a factor is symmetric in both directions.
     Paths paths{(all.col(0) - all.col(1)) / 2, (all.col(0) + all.col(1)) / 2};
     const auto cosine = Eigen::Map<const VectorXd>(d.mu.data(), n),
                weight = Eigen::Map<const VectorXd>(d.weight.data(), n);

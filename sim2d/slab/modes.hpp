@@ -16,13 +16,13 @@ namespace medulla::sim2d {
 ///   M D~' = -X S~ + s,   M S~' = -Y D~ + d,   X = 1 - (C + F)~, Y = 1 - (C - F)~   (optical depth as the unit)
 /// where C scatters within a hemisphere and F across. With X = L L^T, Y = R R^T and L^-1 M R^-T = U diag(1/k) V^T
 /// the modes exp(-+k tau) are S~ = L^-T u, D~ = +-R^-T v, and S~_m^T M D~_n = delta_mn / k_m: sources are projected
-/// by inner products. mu enters once and is never divided by, so grazing directions cost no precision.
+/// by inner products. Nothing is divided by mu, so grazing directions cost no precision.
 struct SlabModes {
     Eigen::VectorXd k;
     Eigen::MatrixXd sum, difference;                  ///< S and D of mode m at node j, [j, m]
     Eigen::MatrixXd project_sum, project_difference;  ///< [m, j]: mode amplitudes of a source at the nodes
-    /// Even parity: the phase function from node to node, within a hemisphere and across [j, j]; what a source like
-    /// mode n's sum (difference) puts into the sum (difference) of mode m [m, n].
+    /// Even parity: the phase function from node to node, within a hemisphere and across [j, j]; amplitude
+    /// of mode m's sum (difference) for a source shaped like mode n's [m, n].
     Eigen::MatrixXd direct, across, sum_of_sum, difference_of_difference;
     bool conservative = false;  ///< mode 0 is the diffusion mode: S constant in tau, D linear (even parity only)
 };
@@ -45,8 +45,9 @@ class SlabOrdinates {
     /// @param depth optical depth 2 sigma, > 0   @param theta_i in [0, pi/2] [radians], travelling towards +theta_i
     Exit multiply_scattered(double depth, const std::vector<double>& theta_i) const;
 
-    /// By reciprocity: incident light's path times its chance of a side is the radiance of a source that shines where
-    /// and as the chance is, the field of isotropic light on that side. One solve for all angles, of even modes alone.
+    /// By reciprocity: the path of incident light times its probability to leave on a side is the radiance of a source
+    /// equal to that probability, which is the field of isotropic light on that side. One solve for all angles, with
+    /// even modes only.
     Paths multiply_scattered_paths(double depth) const;
 
     const SlabDirections& directions() const noexcept { return directions_; }

@@ -15,31 +15,31 @@ double slab_back_factor(double depth, double mu_i, double mu_r) noexcept;
 /// = b (exp(-a) - exp(-b)) / (b - a), a = depth / mu_r, b = depth / mu_i, without cancellation at a = b.
 double slab_forward_factor(double depth, double mu_i, double mu_r) noexcept;
 
-/// Mean path, in mean free paths, of the light that slab_back_factor counts: (integral of s exp(-s) over [0, b]) /
+/// Mean path, in mean free paths, of the light of slab_back_factor: (integral of s exp(-s) over [0, b]) /
 /// (1 - exp(-b)), b = depth / mu_r + depth / mu_i. Infinite depth / mu: its limit 1.
 double slab_back_path(double depth, double mu_i, double mu_r) noexcept;
 
-/// The same for slab_forward_factor, depth / mu_r finite: the longer way has the rest of the depth, evenly weighted by
-/// exp(-s). mu_i = 0: 1 + depth / mu_r.
+/// The same for slab_forward_factor with finite depth / mu_r: the shorter way over the whole depth, plus a part of the
+/// difference to the longer one, weighted with exp(-s). mu_i = 0: 1 + depth / mu_r.
 double slab_forward_path(double depth, double mu_i, double mu_r) noexcept;
 
-/// What leaves either side of the slab, per unit of scattered light.
+/// A quantity of the light that leaves either side of the slab, per unit of scattered light.
 struct SlabSides {
     double back = 0, forward = 0;
 };
 
-/// Path times energy of the light scattered exactly once, over slab_energy: [radii]. By quadrature over the directions
-/// in which it leaves, graded to grazing and to the phase function's peak: to 1e-9 for every sigma > 0, however small.
+/// Path length times energy of light scattered exactly once, relative to slab_energy [radii]. Quadrature over the exit
+/// directions, graded towards grazing and the phase function's peak: error 1e-9 for every sigma > 0, however small.
 SlabSides slab_single_paths(double sigma, double g, double theta_i);
 
 /// Raw density per radian of theta_r of the energy scattered exactly once that leaves on the side of the light.
-/// The sign is that of physics.md: theta_i inclines the direction towards the light, so p is read at
+/// Sign as in physics.md: theta_i is the inclination of the direction towards the light, so p is evaluated at
 /// pi - (theta_r - theta_i).
 /// @param sigma scattering coefficient [1 / radius], >= 0   @param g mean cosine in (-1, 1)
 /// @param theta_i, theta_r inclinations [radians], |theta| <= pi/2; |theta_i| = pi/2 is the limit
 double slab_single_back(double sigma, double g, double theta_i, double theta_r) noexcept;
 
-/// As slab_single_back, for the far side: p is read at theta_r + theta_i, so the peak lies at theta_r = -theta_i.
+/// As slab_single_back, for the far side: p is evaluated at theta_r + theta_i, so the peak lies at theta_r = -theta_i.
 double slab_single_forward(double sigma, double g, double theta_i, double theta_r) noexcept;
 
 /// Integral of p(t; g) over [a, b] [radians], 0 <= b - a <= 2 pi; exact also where the peak is far narrower than b - a.

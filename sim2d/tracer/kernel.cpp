@@ -1,5 +1,6 @@
-// Lanes of the tracer, compiled once per instruction set; the best one the machine has runs.
-// Positions and directions are floats (a lobe's error from that is below 1e-5), sums of a batch are flushed to doubles.
+// The tracer's SIMD kernel, compiled once per instruction set; the best one of the machine is chosen at run time.
+// Positions and directions are floats, which adds less than 1e-5 to a lobe's error; sums of a batch are added to
+// doubles.
 #include "sim2d/tracer/kernel.hpp"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 #include "sim2d/random.hpp"
 #include "sim2d/tracer/state.hpp"
 
-// Lanes are kept in structs, which vectors without a size cannot be.
+// Vectors are members of structs, which those of unknown size cannot be.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sim2d/tracer/kernel.cpp"
@@ -47,10 +48,10 @@ void directions(const TracerCell& cell, std::size_t step, std::size_t count, std
     }
 }
 
-/// Scattering orders fit 24 bits; the lattice's shifts take a block that no order reaches in practice.
+/// Scattering orders fit into 24 bits; the lattice's shifts use the last block, which no path reaches in practice.
 constexpr std::uint32_t kShiftBlock = 0xFFFFFFu;
 
-/// Compiled, and possible on this processor; asked once, since choosing one hides the others.
+/// Compiled, and supported by this processor; queried once, since selecting one hides the others.
 const std::vector<std::int64_t>& targets() {
     static const std::vector<std::int64_t> all = hwy::SupportedAndGeneratedTargets();
     return all;
@@ -59,15 +60,15 @@ const std::vector<std::int64_t>& targets() {
 }  // namespace
 
 TracerCounter tracer_counter(const TracerCell& cell, std::uint32_t order, std::uint32_t randomisation,
-                             std::uint32_t walk) noexcept {
-    // RandomStream's layout with path = (randomisation, walk); the key differs, so that the analog twin of the same
-    // seed and cell is independent.
-    return {{(order & 0xFFFFFFu) | randomisation << 24, walk, static_cast<std::uint32_t>(cell.cell),
+                             std::uint32_t path) noexcept {
+    // RandomStream's layout with path = (randomisation, path). The key differs, so that the analog tracer is
+    // independent under the same seed and cell.
+    return {{(order & 0xFFFFFFu) | randomisation << 24, path, static_cast<std::uint32_t>(cell.cell),
              static_cast<std::uint32_t>(cell.cell >> 32)},
             {static_cast<std::uint32_t>(cell.seed), static_cast<std::uint32_t>(cell.seed >> 32) ^ 0x7AC3E125u}};
 }
 
-WalkTracer::WalkTracer(const TracerCell& cell) : state_(new State) {
+PathTracer::PathTracer(const TracerCell& cell) : state_(new State) {
     State& s = *state_;
     s.cell = cell;
     const double a = std::abs(cell.g);
@@ -100,21 +101,21 @@ WalkTracer::WalkTracer(const TracerCell& cell) : state_(new State) {
     s.absorbed_comb.assign(cell.absorption.size() * s.comb_sum.size(), 0.0f);
     s.absorbed_window.assign(cell.absorption.size() * s.window_sum.size(), 0.0f);
     s.absorbed_length.assign(cell.absorption.size() * kLaneMargin, 0.0f);
-    s.walks.reserve(kBatch + kLaneMargin);
-    s.pay.reserve(kBatch + kLaneMargin);
+    s.paths.reserve(kBatch + kLaneMargin);
+    s.deposits.reserve(kBatch + kLaneMargin);
     s.shift.assign(kLatticeDims, 0);
 }
 
-WalkTracer::~WalkTracer() = default;
+PathTracer::~PathTracer() = default;
 
-void WalkTracer::trace(std::uint32_t randomisation, std::uint64_t first, std::uint64_t count, TracerSums& sums) {
+void PathTracer::trace(std::uint32_t randomisation, std::uint64_t first, std::uint64_t count, TracerSums& sums) {
     State& s = *state_;
     const TracerCell& cell = s.cell;
     sums.bins.resize(cell.bins, 0.0);
     sums.absorbed.resize(cell.absorption.size() * cell.bins, 0.0);
     sums.absorbed_length.resize(cell.absorption.size(), 0.0);
     const double width = 2 * pi / cell.bins;
-    // Floats hold one batch's sums only.
+    // Floats accumulate one batch only.
     const auto flush = [&](float* comb_sum, float* window_sum, double* bins) {
         const std::uint32_t comb = cell.plan.comb;
         for (std::uint32_t b = 0; b < cell.bins; ++b)
@@ -132,11 +133,11 @@ void WalkTracer::trace(std::uint32_t randomisation, std::uint64_t first, std::ui
     while (count > 0) {
         const std::size_t n = static_cast<std::size_t>(std::min<std::uint64_t>(count, kBatch));
         for (std::size_t i = 0; i < n; ++i) {
-            s.walks.index[i] = static_cast<std::uint32_t>(first + i);
-            s.walks.reversed[i] = reverse_bits(s.walks.index[i]);
+            s.paths.index[i] = static_cast<std::uint32_t>(first + i);
+            s.paths.reversed[i] = reverse_bits(s.paths.index[i]);
         }
         HWY_DYNAMIC_DISPATCH(TraceBatch)(s, randomisation, n, sums);
-        first += n, count -= n, sums.walks += n;
+        first += n, count -= n, sums.paths += n;
         flush(s.comb_sum.data(), s.window_sum.data(), sums.bins.data());
         for (std::size_t j = 0; j < cell.absorption.size(); ++j) {
             flush(s.absorbed_comb.data() + j * s.comb_sum.size(), s.absorbed_window.data() + j * s.window_sum.size(),
@@ -169,7 +170,7 @@ std::vector<std::string> tracer_targets() {
 }
 
 void set_tracer_target(const std::string& name) {
-    std::int64_t chosen = 0;  // Highway's word for "as the processor has it"
+    std::int64_t chosen = 0;  // Highway: whatever the processor supports
     for (const std::int64_t target : targets())
         if (hwy::TargetName(target) == name) chosen = target;
     if (chosen == 0 && !name.empty()) throw std::invalid_argument("instruction set: not one of this processor's");

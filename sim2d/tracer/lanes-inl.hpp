@@ -1,4 +1,4 @@
-// Walks and payments over lanes of floats, included once per instruction set by tracer_kernel.cpp.
+// Paths and their deposits over SIMD lanes of floats; kernel.cpp includes this once per instruction set.
 #if defined(MEDULLA_TRACER_LANES_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef MEDULLA_TRACER_LANES_INL
 #undef MEDULLA_TRACER_LANES_INL
@@ -15,8 +15,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace medulla::sim2d {
 namespace HWY_NAMESPACE {
-/// Coordinate of a lattice; `tent` folds it, so that what is not periodic becomes so (the baker's transform).
-HWY_INLINE VU Lattice(const WalkTracer::State& s, VU reversed, std::uint32_t dim, bool tent) {
+/// Coordinate of a lattice point. `tent` folds it (the baker's transform), which makes the integrand periodic.
+HWY_INLINE VU Lattice(const PathTracer::State& s, VU reversed, std::uint32_t dim, bool tent) {
     const VI product = hn::Mul(hn::BitCast(I(), reversed), hn::Set(I(), static_cast<std::int32_t>(kLattice[dim])));
     const VU u = hn::Add(hn::BitCast(U(), product), hn::Set(U(), s.shift[dim]));
     if (!tent) return u;
@@ -43,14 +43,14 @@ HWY_INLINE Reach ReachOf(VF x, VF y, VF s, VDirection d) {
     return {hn::Mul(left, per_cosine), hn::Mul(hn::Sub(Constant(2), left), per_cosine)};
 }
 
-/// What all deposits of one vertex share. Positions and directions are in the frame that the offset turned.
+/// Data shared by all deposits of one vertex. Positions and directions are in the frame turned by the offset.
 struct Vertex {
     VF x, y, s, rest, dx, dy, cos_turn, sin_turn, weight;
 };
 
 /// Light that leaves towards u: weight p(d . u) exp(-sigma distance).
 template <Medium M>
-HWY_INLINE VF Escaping(const WalkTracer::State& st, const Vertex& v, VF ux, VF uy, VF& distance, MF& forward) {
+HWY_INLINE VF Escaping(const PathTracer::State& st, const Vertex& v, VF ux, VF uy, VF& distance, MF& forward) {
     const F f;
     if (M == Medium::disc) {
         const VF a = hn::MulAdd(v.x, ux, hn::Mul(v.y, uy));
@@ -66,8 +66,8 @@ HWY_INLINE VF Escaping(const WalkTracer::State& st, const Vertex& v, VF ux, VF u
     return hn::Div(hn::Mul(v.weight, Exp2(hn::Mul(distance, Constant(-st.sigma * kLog2E)))), q);
 }
 
-/// The same deposit in media that absorb: times exp(-absorption path), into sums that lie `stride` apart.
-HWY_INLINE void DepositAbsorbed(WalkTracer::State& st, VF value, VF path, float* sum, std::size_t stride) {
+/// The same deposit in absorbing media: times exp(-absorption path), into sums that are `stride` apart.
+HWY_INLINE void DepositAbsorbed(PathTracer::State& st, VF value, VF path, float* sum, std::size_t stride) {
     const F f;
     for (std::size_t j = 0; j < st.absorbed_rate.size(); ++j) {
         const VF left = hn::Mul(value, Exp2(hn::Mul(path, Constant(st.absorbed_rate[j]))));
@@ -79,11 +79,11 @@ HWY_INLINE void DepositAbsorbed(WalkTracer::State& st, VF value, VF path, float*
 
 /// Deposits of one vertex into the bins of its comb, and of its window. `length`: slab, sums of light times path.
 template <Medium M, bool kWindow>
-HWY_INLINE void PayOne(WalkTracer::State& st, std::size_t i, VF length[2]) {
+HWY_INLINE void DepositVertex(PathTracer::State& st, std::size_t i, VF length[2]) {
     const F f;
     const I in;
     const std::size_t lanes = hn::Lanes(f);
-    const Payments& p = st.pay;
+    const Deposits& p = st.deposits;
     const std::int32_t comb = static_cast<std::int32_t>(st.cell.plan.comb);
     Vertex v{hn::Set(f, p.far_x[i]),   hn::Set(f, p.far_y[i]),   hn::Set(f, M == Medium::disc ? p.s[i] : p.x[i]),
              hn::Set(f, 2 - p.x[i]),   hn::Set(f, p.far_dx[i]),  hn::Set(f, p.far_dy[i]),
@@ -138,12 +138,12 @@ HWY_INLINE void PayOne(WalkTracer::State& st, std::size_t i, VF length[2]) {
     }
 }
 
-/// Vertices that roulette lets be paid go to the payments, with their weight. @return how many
+/// Selects the vertices that deposit, by roulette, and stores them with their weight. @return their number
 template <Medium M>
-std::size_t Choose(WalkTracer::State& st, std::size_t count) {
+std::size_t Choose(PathTracer::State& st, std::size_t count) {
     const F f;
-    const Walks& w = st.walks;
-    Payments& p = st.pay;
+    const Paths& w = st.paths;
+    Deposits& p = st.deposits;
     const VF rate = Constant(-st.sigma * kLog2E), beta = Constant(st.cell.plan.turned), flip = Constant(st.flip);
     const bool absorbs = M == Medium::disc && !st.absorbed_rate.empty();
     std::size_t out = 0;
@@ -151,32 +151,32 @@ std::size_t Choose(WalkTracer::State& st, std::size_t count) {
         const VF x = hn::LoadU(f, &w.x[i]), y = hn::LoadU(f, &w.y[i]), s = hn::LoadU(f, &w.s[i]);
         const VF weight = hn::LoadU(f, &w.w[i]);
         const VDirection d{hn::Mul(flip, hn::LoadU(f, &w.dx[i])), hn::Mul(flip, hn::LoadU(f, &w.dy[i]))};
-        // Light that goes straight on leaves along the peak of the phase function, light that turns by the nearest way.
-        // These set chances only, so that rough values do: 1 - r to 20 %, from s = 1 - r^2.
+        // Estimate of what escapes: straight on along the phase function's peak, or turned, by the shortest way out.
+        // It only sets a probability, so rough values suffice: 1 - r to 20 %, from s = 1 - r^2.
         const VF nearest = M == Medium::disc ? hn::Mul(s, hn::MulAdd(s, Constant(0.2f), Constant(0.5f)))
                                              : hn::Min(x, hn::Sub(Constant(2), x));
         const VF straight = Exp2(hn::Mul(hn::LoadU(f, &w.straight[i]), rate)), turned = Exp2(hn::Mul(nearest, rate));
         const VF escape = hn::Mul(weight, hn::MulAdd(beta, hn::Sub(turned, straight), straight));
-        const VF chance = hn::Min(Constant(1), hn::Mul(escape, Constant(1 / st.cell.plan.pay)));
-        const MF paid = hn::And(hn::Lt(hn::LoadU(f, &w.chance[i]), chance), hn::FirstN(f, count - i));
-        if (hn::AllFalse(f, paid)) continue;  // as deep in dense media
-        const Squeeze squeeze(paid);
+        const VF chance = hn::Min(Constant(1), hn::Mul(escape, Constant(1 / st.cell.plan.roulette)));
+        const MF chosen = hn::And(hn::Lt(hn::LoadU(f, &w.chance[i]), chance), hn::FirstN(f, count - i));
+        if (hn::AllFalse(f, chosen)) continue;  // common deep in dense media
+        const Squeeze squeeze(chosen);
         squeeze.Store(weight, &p.weight[out]), squeeze.Store(chance, &p.chance[out]),
             squeeze.Store(hn::LoadU(U(), &w.place[i]), &p.place[out]);
         squeeze.Store(x, &p.x[out]), squeeze.Store(y, &p.y[out]), squeeze.Store(s, &p.s[out]);
         squeeze.Store(d.x, &p.far_dx[out]), squeeze.Store(d.y, &p.far_dy[out]);
         if (absorbs) squeeze.Store(hn::LoadU(f, &w.length[i]), &p.length[out]);
-        out += hn::CountTrue(f, paid);
+        out += hn::CountTrue(f, chosen);
     }
     return out;
 }
 
-/// Pays the vertices that are chosen: at which offset in the comb and in the bin, then into every bin.
+/// Deposits the selected vertices: draws the offset in comb and bin, then adds to every bin of comb and window.
 template <Medium M, bool kWindow>
-void Pay(WalkTracer::State& st, std::size_t count, TracerSums& sums) {
+void Deposit(PathTracer::State& st, std::size_t count, TracerSums& sums) {
     const F f;
     const std::size_t lanes = hn::Lanes(f);
-    Payments& p = st.pay;
+    Deposits& p = st.deposits;
     count = Choose<M>(st, count);
     const float comb = static_cast<float>(st.cell.plan.comb), bins = static_cast<float>(st.cell.bins);
     const float start = M == Medium::disc ? 0.5f : 0.25f;  // bin 0 lies this many turns below angle 0
@@ -207,10 +207,10 @@ void Pay(WalkTracer::State& st, std::size_t count, TracerSums& sums) {
         }
     }
     VF length[2] = {hn::Zero(f), hn::Zero(f)};
-    for (std::size_t i = 0; i < count; ++i) PayOne<M, kWindow>(st, i, length);
+    for (std::size_t i = 0; i < count; ++i) DepositVertex<M, kWindow>(st, i, length);
     sums.deposits += count * (st.comb_count + st.cell.plan.window);
     if (M == Medium::slab) {
-        const double width = 2 * 3.14159265358979323846 / static_cast<double>(st.cell.bins);
+        const double width = 2 * pi / static_cast<double>(st.cell.bins);
         for (const int side : {0, 1})
             sums.length[side] += width * static_cast<double>(hn::GetLane(hn::SumOfLanes(f, length[side])));
     }
@@ -218,10 +218,10 @@ void Pay(WalkTracer::State& st, std::size_t count, TracerSums& sums) {
 
 /// First collisions, in the direction of the light. @return sum of their flights
 template <Medium M>
-double Start(WalkTracer::State& st, std::size_t count) {
+double Start(PathTracer::State& st, std::size_t count) {
     const F f;
     const std::size_t lanes = hn::Lanes(f);
-    Walks& w = st.walks;
+    Paths& w = st.paths;
     double length = 0;
     for (std::size_t i = 0; i < count; i += lanes) {
         const VU reversed = hn::LoadU(U(), &w.reversed[i]);
@@ -246,14 +246,14 @@ double Start(WalkTracer::State& st, std::size_t count) {
     return length;
 }
 
-/// Scatters the walks at their vertices and flies on; walks that end are squeezed out. @return how many go on
+/// Scatters the paths at their vertices and draws the next flight; removes those that end. @return how many remain
 template <Medium M, bool kForced>
-std::size_t Fly(WalkTracer::State& st, std::uint32_t order, std::uint32_t randomisation, std::size_t count, float keep,
+std::size_t Fly(PathTracer::State& st, std::uint32_t order, std::uint32_t randomisation, std::size_t count, float keep,
                 TracerSums& sums) {
     const F f;
     const U u;
     const std::size_t lanes = hn::Lanes(f);
-    Walks& w = st.walks;
+    Paths& w = st.paths;
     const std::uint32_t counter[4] = {(order & 0xFFFFFFu) | randomisation << 24, 0,
                                       static_cast<std::uint32_t>(st.cell.cell),
                                       static_cast<std::uint32_t>(st.cell.cell >> 32)};
@@ -272,7 +272,7 @@ std::size_t Fly(WalkTracer::State& st, std::uint32_t order, std::uint32_t random
             words.b = Lattice(st, reversed, 2 * order, true);
         }
         d = Rotate(d, ScatterTurn(SignedUnit(words.a), st.g, st.flip));
-        // One Newton step keeps the length of the direction at 1 however long the walk.
+        // One Newton step keeps the length of the direction at 1 however long the path.
         const VF n = hn::NegMulAdd(hn::Mul(Constant(0.5f), d.x), d.x,
                                    hn::NegMulAdd(hn::Mul(Constant(0.5f), d.y), d.y, Constant(1.5f)));
         d = {hn::Mul(d.x, n), hn::Mul(d.y, n)};
@@ -284,7 +284,7 @@ std::size_t Fly(WalkTracer::State& st, std::uint32_t order, std::uint32_t random
             const VF share = Absorbed(hn::Mul(Constant(st.sigma), reach.ahead));
             if (M == Medium::disc)
                 length = hn::Add(length, hn::IfThenElseZero(alive, hn::Mul(weight, hn::Mul(share, per_sigma))));
-            // Roulette; what is left of its number in a walk that survives is uniform again, for the payment.
+            // Roulette. Rescaled, the number of a surviving path is uniform again, for the deposit.
             const VF factor = hn::Max(share, Constant(keep)), survival = hn::Div(share, factor);
             alive = hn::And(alive, hn::Lt(chance, survival));
             chance = hn::Div(chance, survival);
@@ -326,23 +326,23 @@ std::size_t Fly(WalkTracer::State& st, std::uint32_t order, std::uint32_t random
 }
 
 template <Medium M, bool kWindow>
-void Batch(WalkTracer::State& st, std::uint32_t randomisation, std::size_t count, TracerSums& sums) {
+void Batch(PathTracer::State& st, std::uint32_t randomisation, std::size_t count, TracerSums& sums) {
     const TracerPlan& plan = st.cell.plan;
     const double flights = Start<M>(st, count);
     if (M == Medium::disc) sums.length[0] += flights;
     for (std::uint32_t order = 1; count > 0; ++order) {
-        // Every walk is scattered twice; later ones may end.
+        // Every path is scattered twice; later flights may end it.
         if (order == 1)
             count = Fly<M, true>(st, order, randomisation, count, 1e-37f, sums);
         else if (order <= plan.forced)
             count = Fly<M, true>(st, order, randomisation, count, plan.keep, sums);
         else
             count = Fly<M, false>(st, order, randomisation, count, 1, sums);
-        Pay<M, kWindow>(st, count, sums);
+        Deposit<M, kWindow>(st, count, sums);
     }
 }
 
-void TraceBatch(WalkTracer::State& st, std::uint32_t randomisation, std::size_t count, TracerSums& sums) {
+void TraceBatch(PathTracer::State& st, std::uint32_t randomisation, std::size_t count, TracerSums& sums) {
     const bool window = st.cell.plan.window > 0;
     if (st.cell.medium == Medium::disc)
         window ? Batch<Medium::disc, true>(st, randomisation, count, sums)
@@ -352,7 +352,8 @@ void TraceBatch(WalkTracer::State& st, std::uint32_t randomisation, std::size_t 
                : Batch<Medium::slab, false>(st, randomisation, count, sums);
 }
 
-/// Words of `count` walks; the arrays are longer by kLaneMargin. words[k * stride + i], stride = count + kLaneMargin.
+/// Random words of `count` paths; the arrays are longer by kLaneMargin. words[k * stride + i], stride = count +
+/// kLaneMargin.
 void Words(const TracerCounter& c, const std::uint32_t* index, std::size_t count, std::uint32_t* words) {
     const U u;
     const std::size_t stride = count + kLaneMargin;

@@ -1,4 +1,4 @@
-// Arithmetic over lanes for the tracer: random words, exponentials, directions as unit complex numbers, compaction.
+// SIMD arithmetic of the tracer: random words, exponentials, directions as unit complex numbers, compaction.
 // Included once per instruction set.
 #if defined(MEDULLA_TRACER_MATH_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef MEDULLA_TRACER_MATH_INL
@@ -27,9 +27,9 @@ using VI = hn::Vec<I>;
 using VU = hn::Vec<U>;
 using MF = hn::Mask<F>;
 
-static_assert(hn::MaxLanes(F()) <= kLaneMargin, "arrays leave room for one vector behind what they hold");
+static_assert(hn::MaxLanes(F()) <= kLaneMargin, "arrays have room for one vector behind their last element");
 
-constexpr float kPiF = 3.14159265f;
+constexpr float kPiF = static_cast<float>(pi);
 
 HWY_INLINE VF Constant(float x) { return hn::Set(F(), x); }
 
@@ -49,7 +49,7 @@ HWY_INLINE void Multiply(VU a, std::uint32_t factor, VU& low, VU& high) {
 #endif
 }
 
-/// Philox4x32-10 over lanes of counters; the scalar twin is in random.hpp.
+/// Philox4x32-10 over lanes of counters; random.hpp has the scalar reference implementation.
 struct Words4 {
     VU a, b, c, d;
 };
@@ -68,12 +68,12 @@ HWY_INLINE Words4 DrawWords(const std::uint32_t counter[4], const std::uint32_t 
     return Philox({hn::Set(u, counter[0]), index, hn::Set(u, counter[2]), hn::Set(u, counter[3])}, key[0], key[1]);
 }
 
-/// (0, 1], 31 bits: for -log(u), which then reaches 22 mean free paths.
+/// (0, 1], 31 bits: for -log(u), whose largest value is then 22 mean free paths.
 HWY_INLINE VF Uniform31(VU bits) {
     const VF x = hn::ConvertTo(F(), hn::BitCast(I(), hn::ShiftRight<1>(bits)));
     return hn::MulAdd(x, Constant(0x1p-31f), Constant(0x1p-32f));
 }
-/// (0, 1), 23 bits: never an end.
+/// (0, 1), 23 bits: never 0 or 1.
 HWY_INLINE VF Uniform23(VU bits) {
     const VF x = hn::ConvertTo(F(), hn::BitCast(I(), hn::ShiftRight<9>(bits)));
     return hn::MulAdd(x, Constant(0x1p-23f), Constant(0x1p-24f));
@@ -89,9 +89,9 @@ HWY_INLINE VF SinPi(VF v) {
     return hn::MulAdd(hn::Mul(p, z), x, x);
 }
 
-/// 2^z for z <= 0, relative error 2e-7; below 2^-126 it stays there.
+/// 2^z for z <= 0, relative error 2e-7; at least 2^-126; NaN for NaN.
 HWY_INLINE VF Exp2(VF z) {
-    z = hn::Max(z, Constant(-126.0f));
+    z = hn::IfThenElse(hn::Lt(z, Constant(-126.0f)), Constant(-126.0f), z);  // hn::Max would drop NaN on x86
     const VI n = hn::NearestInt(z);
     const VF f = hn::Sub(z, hn::ConvertTo(F(), n));
     VF p = Constant(1.3333558e-3f);
@@ -110,7 +110,7 @@ struct VDirection {
 HWY_INLINE VDirection Rotate(VDirection a, VDirection b) {
     return {hn::NegMulAdd(a.y, b.y, hn::Mul(a.x, b.x)), hn::MulAdd(a.x, b.y, hn::Mul(a.y, b.x))};
 }
-/// a turned back by b.
+/// The direction a, rotated by minus the angle of b.
 HWY_INLINE VDirection RotateBack(VDirection a, VDirection b) {
     return {hn::MulAdd(a.x, b.x, hn::Mul(a.y, b.y)), hn::NegMulAdd(a.x, b.y, hn::Mul(a.y, b.x))};
 }
@@ -131,7 +131,7 @@ HWY_INLINE VDirection Turn(VF f) { return ScatterTurn(hn::Sub(f, Constant(0.5f))
 
 /// 1 - exp(-x), x >= 0.
 HWY_INLINE VF Absorbed(VF x) {
-    // Below 1/8 by the series, whose first dropped term is x^6 / 5040; above, the difference is good to 2e-6.
+    // Below 1/8 the series, whose first dropped term is x^6 / 5040; above, the difference is accurate to 2e-6.
     VF p = Constant(-1.0f / 720);
     p = hn::MulAdd(p, x, Constant(1.0f / 120));
     p = hn::MulAdd(p, x, Constant(-1.0f / 24));
@@ -145,7 +145,7 @@ HWY_INLINE VF Absorbed(VF x) {
 /// Depth of the first collision in mean free paths: -log(1 - u share).
 HWY_INLINE VF ForcedDepth(VF u, VF share) { return hn::Neg(hn::Log1p(F(), hn::Neg(hn::Mul(u, share)))); }
 
-/// Angle of a direction in turns, [0, 1), to 1e-3: where a window is placed needs no more.
+/// Angle of a direction in turns, [0, 1), to 1e-3, which is enough to place a window.
 HWY_INLINE VF RoughTurns(VDirection d) {
     const VF ax = hn::Abs(d.x), ay = hn::Abs(d.y), one = Constant(1);
     const VF r = hn::Div(hn::Min(ax, ay), hn::Max(hn::Max(ax, ay), Constant(1e-30f)));
@@ -155,8 +155,8 @@ HWY_INLINE VF RoughTurns(VDirection d) {
     return hn::IfThenElse(hn::Lt(d.y, hn::Zero(F())), hn::Sub(one, t), t);
 }
 
-/// Stores the lanes that a mask keeps, one after the other; up to a vector beyond them is overwritten.
-/// AVX2 has no such instruction: one permutation, looked up once, serves all arrays.
+/// Stores the lanes of a mask contiguously; overwrites up to a vector beyond them.
+/// AVX2 has no such instruction, so one permutation is looked up and used for all arrays.
 class Squeeze {
   public:
     explicit Squeeze(MF kept) : kept_(kept) {
@@ -172,7 +172,7 @@ class Squeeze {
 #if HWY_TARGET == HWY_AVX2
         hn::StoreU(hn::TableLookupLanes(v, hn::IndicesFromVec(F(), hn::BitCast(I(), order_))), F(), to);
 #else
-        hn::StoreU(hn::Compress(v, kept_), F(), to);  // AMD's compressing store takes 100 cycles and more
+        hn::StoreU(hn::Compress(v, kept_), F(), to);  // in registers: AMD's compressing store takes over 100 cycles
 #endif
     }
     HWY_INLINE void Store(VU v, std::uint32_t* to) const {

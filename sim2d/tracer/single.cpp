@@ -10,8 +10,6 @@
 namespace medulla::sim2d {
 namespace {
 
-const double pi = 3.14159265358979323846;
-
 /// 1 - (1 + a) exp(-a) for a >= 0, by its series where that cancels.
 double second_moment(double a) {
     if (a > 0.5) return std::isinf(a) ? 1.0 : -std::expm1(-a) - a * std::exp(-a);
@@ -24,7 +22,7 @@ double second_moment(double a) {
     return sum;
 }
 
-/// Light times path length that leaves on the side of the light: integral of L exp(-sigma L) sigma / mu_i dx over the
+/// Path length times energy that leaves on the side of the light: integral of L exp(-sigma L) sigma / mu_i dx over the
 /// depth, L = x (1 / mu_i + 1 / mu_r).
 double back_moment(double sigma, double mu_i, double mu_r) {
     if (!(mu_r > 0)) return 0;
@@ -35,8 +33,8 @@ double back_moment(double sigma, double mu_i, double mu_r) {
 double forward_moment(double sigma, double mu_i, double mu_r) {
     if (!(mu_r > 0)) return 0;
     const double a = 2 / mu_r, b = mu_i > 0 ? 2 / mu_i : HUGE_VAL;
-    if (std::isinf(b)) return a * std::exp(-sigma * a);  // all of it scatters on the face
-    static const GaussRule rule = unit_gauss_rule(12);
+    if (std::isinf(b)) return a * std::exp(-sigma * a);  // everything scatters at the face
+    static const Quadrature rule = unit_gauss_legendre(12);
     if (sigma * std::abs(b - a) < 2) {
         double sum = 0;
         for (std::size_t i = 0; i < rule.nodes.size(); ++i) {
@@ -52,21 +50,21 @@ double forward_moment(double sigma, double mu_i, double mu_r) {
 }  // namespace
 
 SlabSingle slab_single_lobes(double sigma, double g, double theta_i, std::size_t bins) {
-    // Points per bin: as disc_single_lobe, by the pole of p; near grazing by the scale on which the path factors turn,
-    // for which u^2 (3 - 2 u) gathers the points at both ends.
+    // Points per bin: as in disc_single_lobe from the pole of p. Near grazing the path factors vary on a scale of their
+    // own, so u^2 (3 - 2 u) concentrates the points at both ends of the bin.
     const double width = pi / static_cast<double>(bins);
     const double pole = g == 0 ? 100 : std::min(100.0, -std::log(std::abs(g)) * 2 / width);
     const double rho = pole + std::sqrt(pole * pole + 1);
-    const int count = std::clamp(static_cast<int>(std::ceil(9.2 / std::log(rho))), 2, 64);
-    const GaussRule plain = unit_gauss_rule(std::max(count, bins < 90 ? 24 : 2));
-    const GaussRule graded = unit_gauss_rule(std::max(count, 32));
+    const int count = static_cast<int>(std::clamp(std::ceil(9.2 / std::log(rho)), 2.0, 64.0));
+    const Quadrature plain = unit_gauss_legendre(std::max(count, bins < 90 ? 24 : 2));
+    const Quadrature graded = unit_gauss_legendre(std::max(count, 32));
     const double mu_i = slab_cosine(theta_i), energy = slab_energy(sigma, theta_i);
     SlabSingle out;
     out.back.assign(bins, 0.0), out.forward.assign(bins, 0.0);
     for (std::size_t b = 0; b < bins; ++b) {
         const double low = -pi / 2 + static_cast<double>(b) * width;
         const bool grazing = std::min(low + pi / 2, pi / 2 - low - width) < 0.1;
-        const GaussRule& rule = grazing ? graded : plain;
+        const Quadrature& rule = grazing ? graded : plain;
         for (std::size_t i = 0; i < rule.nodes.size(); ++i) {
             const double u = rule.nodes[i];
             const double theta_r = low + width * (grazing ? u * u * (3 - 2 * u) : u);

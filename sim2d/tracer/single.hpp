@@ -1,4 +1,4 @@
-// Bin averages of light scattered exactly once in the slab, beside its path length; what tracer.cpp adds its walks to.
+// Bin averages of light scattered exactly once in the slab, and its path length; tracer.cpp adds the paths' deposits.
 // docs/physics.md, sections 3 and 4.
 #pragma once
 

@@ -1,27 +1,29 @@
-// What one cell's kernel reads and writes: constants as floats, direction tables, the walks of a batch as arrays.
-// Private to tracer_kernel.cpp and tracer_lanes-inl.hpp.
+// Data of one cell's kernel: constants as floats, direction tables, the paths of a batch as arrays.
+// Private to kernel.cpp and lanes-inl.hpp.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "medulla/config.hpp"
 #include "sim2d/tracer/kernel.hpp"
 
 namespace medulla::sim2d {
 
-inline constexpr std::size_t kLaneMargin = 64;  ///< arrays are this much longer than what they hold
-inline constexpr std::size_t kBatch = 4096;     ///< walks followed together; their arrays fit the second cache
+inline constexpr std::size_t kLaneMargin = 64;  ///< arrays are longer by this much, so that whole vectors can be stored
+inline constexpr std::size_t kBatch = 4096;     ///< paths traced together; their arrays fit the second-level cache
 inline constexpr std::uint32_t kLatticeDims = 25;
 
-/// Walks of a batch: position, direction, weight. Disc: s = 1 - r^2, kept beside x and y without cancellation.
+/// Paths of a batch: position, direction, weight. Disc: s = 1 - r^2, updated beside x and y without cancellation.
 /// Slab: x is the depth, y the path length so far.
-struct Walks {
-    std::vector<float> x, y, s, dx, dy, w, straight,
-        chance;  ///< straight: way out along the phase function's peak; chance: uniform number that decides a payment
-    std::vector<float> length;                   ///< disc: path so far, kept for absorption only
-    std::vector<std::uint32_t> index, reversed;  ///< of the walk; its bits in reverse order
-    std::vector<std::uint32_t> place;            ///< random word: where in its bin and comb a deposit lies
+struct Paths {
+    std::vector<float> x, y, s, dx, dy, w;
+    std::vector<float> straight;                 ///< distance to the boundary along the phase function's peak
+    std::vector<float> chance;                   ///< uniform number for the roulette of the deposit
+    std::vector<float> length;                   ///< disc: path length so far, used for absorption only
+    std::vector<std::uint32_t> index, reversed;  ///< number of the path; its bits in reverse order
+    std::vector<std::uint32_t> place;            ///< random word: position of a deposit in its bin and comb
 
     void reserve(std::size_t n) {
         for (auto* v : {&x, &y, &s, &dx, &dy, &w, &straight, &chance, &length}) v->assign(n, 0.0f);
@@ -29,9 +31,9 @@ struct Walks {
     }
 };
 
-/// Vertices to be paid out. "Near" is turned back by the offset in the
-/// bin, "far" by that and the comb's offset.
-struct Payments {
+/// Vertices that deposit. The "near" frame is turned back by the offset in the bin, the "far" frame by that and the
+/// comb's offset.
+struct Deposits {
     std::vector<float> weight, chance, x, y, s, length, far_x, far_y, far_dx, far_dy, near_x, near_y, near_dx, near_dy,
         cos_far, sin_far, cos_near, sin_near;
     std::vector<std::int32_t> offset, window;
@@ -46,7 +48,7 @@ struct Payments {
     }
 };
 
-/// For each set of eight lanes, which of them come first: their numbers in nibbles, the lowest first.
+/// For each subset of eight lanes the numbers of its lanes as nibbles, the lowest first.
 struct SqueezeTable {
     std::uint32_t lanes[256] = {};
     constexpr SqueezeTable() {
@@ -59,7 +61,7 @@ struct SqueezeTable {
 };
 inline constexpr SqueezeTable kSqueeze{};
 
-struct WalkTracer::State {
+struct PathTracer::State {
     TracerCell cell;
     float sigma, g, p_scale, p_floor;  ///< |g|; p = p_scale / (p_floor + g |d - u|^2)
     float flip;                        ///< -1 for g < 0: p(t; g) = p(pi - t; -g)
@@ -67,13 +69,13 @@ struct WalkTracer::State {
     float dir_x, dir_y;
     std::uint32_t key[2], comb_count, comb_stride;  ///< deposits per vertex; distance between two offsets' bins
     std::vector<float> comb_x, comb_y;              ///< directions of the bins' lower ends, every comb-th
-    std::vector<float> window_x, window_y;          ///< of all bins, continued by a window's length
+    std::vector<float> window_x, window_y;          ///< of all bins, continued by the length of a window
     std::vector<float> comb_sum, window_sum;
     /// Per absorption: -absorption / log 2; sums as comb_sum, window_sum; lanes of light times path.
     std::vector<float> absorbed_rate, absorbed_comb, absorbed_window, absorbed_length;
-    std::vector<std::uint32_t> shift;  ///< of the lattice, per dimension, of the present randomisation
-    Walks walks;
-    Payments pay;
+    std::vector<std::uint32_t> shift;  ///< of the lattice in this randomisation, per dimension
+    Paths paths;
+    Deposits deposits;
 };
 
 /// Extensible rank-1 lattice exod2_base2_m20 of Kuo (Cools, Kuo, Nuyens 2006, "Constructing embedded lattice rules").

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "medulla/config.hpp"
 #include "sim2d/disc/single.hpp"
 #include "sim2d/slab/single.hpp"
 #include "sim2d/tracer/kernel.hpp"
@@ -14,18 +15,16 @@
 namespace medulla::sim2d {
 namespace {
 
-const double pi = 3.14159265358979323846;
-
-/// Independent randomisations of the lattice: what the standard error is measured from.
+/// Independent randomisations of the lattice; the standard error is estimated from their spread.
 constexpr std::uint32_t kRandomisations = 16;
 
-/// Walks of each before the error is first looked at.
+/// Paths of each before the error is first evaluated.
 constexpr std::uint64_t kFirst = 32;
 
-/// Thinner media are traced as this one: their multiply scattered share is below a double's rounding of the single.
+/// Thinner media are traced at this sigma: their multiply scattered share is below the rounding of the single one.
 constexpr double kThin = 1e-30;
 
-/// What floats and the bins' quadrature cost, relative to a lobe.
+/// Relative L2 error of a lobe from float arithmetic and from the quadrature over bins.
 constexpr double kRounding = 3e-6;
 
 void require(bool condition, const char* what) {
@@ -40,22 +39,22 @@ void check(double sigma, double g, std::size_t bins, const TracerOptions& option
     require(options.target_error >= 0, "target_error: expected a value >= 0");
 }
 
-/// A range of bins that is one lobe.
+/// Range of bins of one lobe.
 struct Side {
     std::size_t first, last;
 };
 
-/// Singly scattered light over the energy that is scattered in all at no absorption: density per bin, and the integral
-/// of it times the path length.
+/// Singly scattered light, relative to all the energy scattered without absorption: density per bin, and its integral
+/// times the path length.
 struct Single {
     std::vector<double> density;
     double length = 0;
 };
 
-/// Estimates of a cell from what the randomisations paid; shares are of the energy that was scattered at least once.
+/// Estimates of a cell from the deposits of the randomisations; shares are of the energy scattered at least once.
 class Estimate {
   public:
-    /// @param sides lobes to be normalised each   @param absorbed of the disc in media that absorb
+    /// @param sides lobes, each to be normalised   @param absorbed single scattering of the disc in absorbing media
     Estimate(std::vector<double> single, std::vector<Side> sides, bool mirror, std::vector<Single> absorbed = {})
         : single_(std::move(single)), sides_(std::move(sides)), mirror_(mirror), absorbed_(std::move(absorbed)) {
         width_ = 2 * pi / static_cast<double>(single_.size());
@@ -68,30 +67,30 @@ class Estimate {
         double length = 0;  ///< of an absorbed lobe: mean path
     };
 
-    /// The sides' lobes, then the absorbed ones.
-    /// @param sums one per randomisation, the same number of walks each
+    /// The sides' lobes, then those with absorption.
+    /// @param sums one per randomisation, each of the same number of paths
     std::vector<Lobe> lobes(const std::vector<TracerSums>& sums) const {
         const std::size_t count = sums.size();
-        const Paid paid = paid_by(sums, [](const TracerSums& s) { return s.bins; });
-        const Scale scale = scale_of(paid.all);
+        const Deposited multiple = deposited_by(sums, [](const TracerSums& s) { return s.bins; });
+        const Scale scale = scale_of(multiple.all);
         std::vector<Lobe> out;
-        for (const Side side : sides_) out.push_back(lobe_of(side, single_, paid, paid, scale));
+        for (const Side side : sides_) out.push_back(lobe_of(side, single_, multiple, multiple, scale));
         if (sides_.size() == 1) out[0].share_error = 0;
-        // Rounding must not leave a side with more than all of the energy.
+        // Rounding must not give a side more than all of the energy.
         double shares = 0;
         for (const Lobe& lobe : out) shares += lobe.share;
         for (Lobe& lobe : out) lobe.share /= shares;
         for (std::size_t j = 0; j < absorbed_.size(); ++j) {
             const auto bins = static_cast<std::ptrdiff_t>(single_.size()),
                        first = static_cast<std::ptrdiff_t>(j) * bins;
-            const Paid left = paid_by(sums, [&](const TracerSums& s) {
+            const Deposited left = deposited_by(sums, [&](const TracerSums& s) {
                 return std::vector<double>(s.absorbed.begin() + first, s.absorbed.begin() + first + bins);
             });
-            out.push_back(lobe_of(sides_[0], absorbed_[j].density, left, paid, scale));
+            out.push_back(lobe_of(sides_[0], absorbed_[j].density, left, multiple, scale));
             double length = 0;
             for (const TracerSums& s : sums)
-                length += s.absorbed_length[j] / static_cast<double>(s.walks) / static_cast<double>(count);
-            out.back().length = (scale.single * absorbed_[j].length + scale.paid * length) / out.back().share;
+                length += s.absorbed_length[j] / static_cast<double>(s.paths) / static_cast<double>(count);
+            out.back().length = (scale.single * absorbed_[j].length + scale.multiple * length) / out.back().share;
         }
         return out;
     }
@@ -99,17 +98,17 @@ class Estimate {
   private:
     static constexpr double kKnown = 1e-3;
 
-    /// What walks paid: per randomisation and bin, its mean; its integrals, and the mean of those.
-    struct Paid {
+    /// Deposits: per randomisation and bin, their mean; their integrals per randomisation, and the mean of those.
+    struct Deposited {
         std::vector<std::vector<double>> part;
         std::vector<double> mean, total;
         double all = 0;
     };
-    /// Factors of what is paid and of singly scattered light.
+    /// Factors of multiply and of singly scattered light.
     struct Scale {
-        double paid, single;
+        double multiple, single;
     };
-    /// The multiply scattered share is known: 1 - single. Where that difference holds no digits, the sum is scaled.
+    /// The multiply scattered share is known: 1 - single. Where that difference has no digits left, the sum is scaled.
     Scale scale_of(double all) const {
         const double known = 1 - single_share_;
         if (known > kKnown && all > 0) return {known / all, 1};
@@ -117,37 +116,37 @@ class Estimate {
     }
 
     template <class Bins>
-    Paid paid_by(const std::vector<TracerSums>& sums, Bins&& bins_of) const {
+    Deposited deposited_by(const std::vector<TracerSums>& sums, Bins&& bins_of) const {
         const std::size_t bins = single_.size(), count = sums.size();
-        Paid paid{std::vector<std::vector<double>>(count), std::vector<double>(bins, 0.0),
-                  std::vector<double>(count, 0.0)};
+        Deposited out{std::vector<std::vector<double>>(count), std::vector<double>(bins, 0.0),
+                      std::vector<double>(count, 0.0)};
         for (std::size_t r = 0; r < count; ++r) {
-            paid.part[r] = bins_of(sums[r]);
-            if (mirror_) symmetrise(paid.part[r]);
+            out.part[r] = bins_of(sums[r]);
+            if (mirror_) symmetrise(out.part[r]);
             for (std::size_t b = 0; b < bins; ++b) {
-                paid.part[r][b] /= static_cast<double>(sums[r].walks);
-                paid.mean[b] += paid.part[r][b] / static_cast<double>(count);
-                paid.total[r] += paid.part[r][b] * width_;
+                out.part[r][b] /= static_cast<double>(sums[r].paths);
+                out.mean[b] += out.part[r][b] / static_cast<double>(count);
+                out.total[r] += out.part[r][b] * width_;
             }
-            paid.all += paid.total[r] / static_cast<double>(count);
+            out.all += out.total[r] / static_cast<double>(count);
         }
-        return paid;
+        return out;
     }
 
-    /// @param base what the same walks paid at no absorption: what `scale` is made of
-    Lobe lobe_of(const Side side, const std::vector<double>& single, const Paid& paid, const Paid& base,
+    /// @param base deposits of the same paths without absorption, from which `scale` was computed
+    Lobe lobe_of(const Side side, const std::vector<double>& single, const Deposited& multiple, const Deposited& base,
                  const Scale& scale) const {
-        const std::size_t count = paid.part.size();
+        const std::size_t count = multiple.part.size();
         Lobe lobe;
         for (std::size_t b = side.first; b < side.last; ++b) {
-            lobe.density.push_back(scale.single * single[b] + scale.paid * paid.mean[b]);
+            lobe.density.push_back(scale.single * single[b] + scale.multiple * multiple.mean[b]);
             lobe.share += lobe.density.back() * width_;
         }
         double squares = 0;
         for (double& d : lobe.density) d /= lobe.share, squares += d * d;
-        // The jackknife: what the same quotients are without each randomisation in turn. Their first-order deviations
-        // alone understate the error of few walks, where what is paid is skew (Efron & Stein 1981: the jackknife does
-        // not, on average).
+        // The jackknife: the same ratios without each randomisation in turn. First-order error propagation would
+        // understate the error of few paths, whose deposits are skewed; on average the jackknife does not
+        // (Efron & Stein 1981).
         const double n = static_cast<double>(count);
         const auto without = [n](double mean, double part) { return mean + (mean - part) / (n - 1); };
         double variance = 0, share_variance = 0;
@@ -157,12 +156,13 @@ class Estimate {
             double share = 0;
             for (std::size_t i = 0; i < other.size(); ++i) {
                 const std::size_t b = side.first + i;
-                other[i] = scale_r.single * single[b] + scale_r.paid * without(paid.mean[b], paid.part[r][b]);
+                other[i] =
+                    scale_r.single * single[b] + scale_r.multiple * without(multiple.mean[b], multiple.part[r][b]);
                 share += other[i] * width_;
             }
             share_variance += (share - lobe.share) * (share - lobe.share);
             for (std::size_t i = 0; i < other.size(); ++i) {
-                // A lobe that one randomisation alone paid into is nothing without it: off by all of itself.
+                // A lobe with deposits of one randomisation only is empty without it: its error is all of it.
                 const double e = (share > 0 ? other[i] / share : 0) - lobe.density[i];
                 variance += e * e;
             }
@@ -195,7 +195,7 @@ struct Run {
 Run run(const TracerCell& cell, const Estimate& estimate, const TracerOptions& options) {
     Run out;
     out.sums.resize(kRandomisations);
-    WalkTracer tracer(cell);
+    PathTracer tracer(cell);
     const std::uint64_t most = (options.paths + kRandomisations - 1) / kRandomisations;
     const double target = std::max(options.target_error, 0.0);
     for (std::uint64_t done = 0; done < most && !out.reached;) {
@@ -206,21 +206,22 @@ Run run(const TracerCell& cell, const Estimate& estimate, const TracerOptions& o
         out.reached = true;
         for (const Estimate::Lobe& lobe : out.lobes) out.reached = out.reached && lobe.standard_error <= target;
     }
-    for (const TracerSums& s : out.sums) out.paths += s.walks, out.scatterings += s.scatterings;
+    for (const TracerSums& s : out.sums) out.paths += s.paths, out.scatterings += s.scatterings;
     return out;
 }
 
 double mean_of(const std::vector<TracerSums>& sums, int which) {
-    double length = 0, walks = 0;
-    for (const TracerSums& s : sums) length += s.length[which], walks += static_cast<double>(s.walks);
-    return length / walks;
+    double length = 0, paths = 0;
+    for (const TracerSums& s : sums) length += s.length[which], paths += static_cast<double>(s.paths);
+    return length / paths;
 }
 
 /// (1 - exp(-x)) / x.
 double mean_transmission(double x) { return x > 0 ? -std::expm1(-x) / x : 1; }
 
-/// First collisions fall as exp(-(sigma + a) t), and leave over exp(-(sigma + a) d): the closed form at the extinction
-/// of both, which is over its own first collisions' energy, brought to that without absorption.
+/// Single scattering with absorption a: first collisions fall as exp(-(sigma + a) t) and leave as exp(-(sigma + a) d).
+/// That is the closed form at extinction sigma + a, rescaled from its own first collisions' energy to that without
+/// absorption.
 Single absorbed_single(double sigma, double a, double g, double h, std::size_t bins) {
     const double extinction = sigma + a, chord = 2 * std::sqrt((1 - h) * (1 + h));
     const double ratio = mean_transmission(extinction * chord) / mean_transmission(sigma * chord);

@@ -11,7 +11,8 @@
 namespace medulla::tables {
 namespace {
 
-/// What a further refinement is expected to cost, times the last: by counting 10; grids take 2 to 3 (docs/accuracy.md).
+/// Expected cost of a refinement relative to the one before: 10 times the paths for half a decade; grids take 2 to 3
+/// times as long (bench/bench_simulation, docs/accuracy.md).
 double growth_of(Method method) { return method == Method::analog || method == Method::mc ? 10 : 4; }
 
 double worst(const Refinable& slice) {
@@ -41,7 +42,7 @@ std::size_t refine(const SliceSolver& solver, std::vector<Refinable> slices, dou
     std::atomic<bool> failed{false};
     std::mutex mutex;
     std::size_t solves = 0;
-    // Takes the most worthwhile slice that still fits, out of the list while it is in work.
+    // Removes from the list the slice with the largest gain per second that still fits into the budget.
     const auto take = [&]() -> std::optional<std::pair<Refinable, double>> {
         const std::lock_guard<std::mutex> lock(mutex);
         const double left = deadline - omp_get_wtime();
@@ -79,7 +80,7 @@ std::size_t refine(const SliceSolver& solver, std::vector<Refinable> slices, dou
             }
             const std::lock_guard<std::mutex> lock(mutex);
             ++solves;
-            if (better) slices.push_back(std::move(slice));  // one that no longer betters is left as it is
+            if (better) slices.push_back(std::move(slice));  // a slice that no longer improves is left as it is
         }
     });
     return solves;

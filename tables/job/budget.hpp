@@ -1,4 +1,4 @@
-// --time-budget: every slice to a coarse error, then the seconds that are left where error falls most for them.
+// --time-budget: after a coarse solve of every slice, spends the remaining seconds where they reduce the error most.
 #pragma once
 
 #include <atomic>
@@ -9,20 +9,20 @@
 
 namespace medulla::tables {
 
-/// Errors by which slices are refined, one after the other: a half of a decade each.
+/// Successive target errors of a slice, half a decade apart.
 inline constexpr double refinements[] = {1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4};
 
-/// A slice that is to be bettered, and what is known of it.
+/// A solved slice that may be refined.
 struct Refinable {
     SliceId id;
-    std::vector<double> standard_error;  ///< of its cells
-    double seconds = 0;                  ///< its last solve took, or is thought to have taken; > 0
+    std::vector<double> standard_error;  ///< of each cell
+    double seconds = 0;                  ///< of its last solve, measured or expected; > 0
 };
 
-/// Solves slices again to the next of `refinements` below their worst error, that one first whose sum of squared errors
-/// is expected to fall most per second, until the budget would be overrun by the next. Which slices get how far depends
-/// on the clock; each slice alone does not.
-/// @param seconds that are left   @param keep called from any thread with each bettered slice
+/// Solves slices again to the next of `refinements` below their worst error, first the one whose sum of squared errors
+/// is expected to fall most per second, until the next solve would exceed the budget. Which slices are refined depends
+/// on the clock, the result of each solve does not.
+/// @param seconds remaining budget   @param keep called from any thread with each improved slice
 /// @return solves done
 std::size_t refine(const SliceSolver& solver, std::vector<Refinable> slices, double seconds, int threads,
                    const std::atomic<bool>& stop, const std::function<void(const SliceId&, const Slice&)>& keep);

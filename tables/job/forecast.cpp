@@ -13,12 +13,12 @@ Forecast forecast(const Request& request, const std::vector<SliceId>& slices, do
     out.slices = slices.size();
     double expected = 0;
     for (const SliceId& id : slices) {
-        out.cells += slice_cells(table_of(solver.plan(), id.table));
+        out.cells += slice_cells(solver.plan().at(id.table));
         expected += static_cast<double>(expected_cost(request, id));
     }
-    // With a budget, what a slice takes at first.
+    // With a budget, the first, coarse solve.
     const double target = request.time_budget > 0 ? greatest_target : request.target_error;
-    // Places in the order of cost: middle, quarters, eighths ..: dearer ones come late, and may not come at all.
+    // Positions in the order of cost: middle, quarters, eighths ..: the most expensive come last, if at all.
     std::vector<double> places;
     for (double step = 0.5; step > 1.0 / 64; step /= 2)
         for (double place = 1 - step; place > 0; place -= 2 * step) places.push_back(place);

@@ -1,7 +1,7 @@
-// What a job would simulate and how long it will take, from a few of its slices.
+// Size and expected duration of a job, from the solve times of a few slices.
 #pragma once
 
-#include "tables/job/schedule.hpp"
+#include "tables/job/cost.hpp"
 #include "tables/job/simulate.hpp"
 
 namespace medulla::tables {
@@ -10,11 +10,11 @@ struct Forecast {
     std::size_t slices = 0, cells = 0;
     double core_seconds = 0;   ///< of all slices on one core of this machine
     double seconds = 0;        ///< on the request's threads
-    std::size_t measured = 0;  ///< slices that were solved to know it
+    std::size_t measured = 0;  ///< slices that were solved for it
 };
 
-/// Expected costs (tables/job/schedule.hpp) of the slices, scaled by what some of them take: the median slice first,
-/// then its neighbours at even steps of the cost, until `patience` seconds are spent.
+/// Expected costs (tables/job/cost.hpp) of the slices, scaled by the time that some of them take: the median slice
+/// first, then others at even steps of the cost, until `patience` seconds are spent.
 Forecast forecast(const Request& request, const std::vector<SliceId>& slices, double patience);
 
 }  // namespace medulla::tables

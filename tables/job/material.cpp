@@ -19,7 +19,7 @@ std::string read_text(const std::string& path) {
     return {bytes.begin(), bytes.end()};
 }
 
-/// A value as it is quoted in a message.
+/// A value, shortened for messages.
 std::string quoted(const json& value) { return value.dump().substr(0, 40); }
 
 double number(const json& value, const std::string& field) {
@@ -51,7 +51,7 @@ bool refused(const FurParameters<3>& fur, const Field& field) {
     return check(alone) != FurStatus::ok;
 }
 
-/// `pointer`: JSON pointer of the entry in its file, empty where it is the whole.
+/// @param pointer JSON pointer of the entry in its file, empty for the whole file
 Material material_of(const json& entry, const std::string& path, const std::string& pointer) {
     const std::string inside = path + ": " + pointer;
     if (!entry.is_object())

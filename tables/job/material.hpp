@@ -14,11 +14,11 @@ struct Material {
     bool grey = true;  ///< sigma_ca is one number, not three
 };
 
-/// One material of a file: {"name": .., "preset": .., "eta": .., ..}. A preset comes first, fields override it.
+/// One material of a file: {"name": .., "preset": .., "eta": .., ..}. The preset is applied first; fields override it.
 Material read_material(const std::string& path);
 /// The materials of a scene file: {"materials": [..]}.
 std::vector<Material> read_scene(const std::string& path);
-/// The same of texts; `where` stands for the file in messages.
+/// The same from text; messages name `where` as the file.
 Material parse_material(const std::string& text, const std::string& where);
 std::vector<Material> parse_scene(const std::string& text, const std::string& where);
 /// A row of Table 4 by name; throws Error that lists the names there are.

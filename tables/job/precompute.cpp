@@ -10,6 +10,9 @@
 #include "tables/error.hpp"
 #include "tables/job/budget.hpp"
 #include "tables/parallel.hpp"
+#include "tables/store/file.hpp"
+#include "tables/store/job_difference.hpp"
+#include "tables/streams.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -23,7 +26,7 @@ constexpr unsigned seconds_of_grace = 5;
 /// What a signal handler may do: say it and end. Slices are on disk or not, so nothing is left half done.
 [[noreturn]] void give_up() {
     constexpr char text[] = "medulla-precompute: interrupted: slices in work given up; go on with --resume\n";
-    if (::write(STDERR_FILENO, text, sizeof text - 1) < 0) ::_exit(1);
+    message(STDERR_FILENO, text, sizeof text - 1);
     ::_exit(128 + caught);
 }
 
@@ -60,15 +63,16 @@ class Interrupts {
 std::optional<Tables> finished(const Job& job, const Tables& plan) {
     if (!std::filesystem::exists(job.output)) return std::nullopt;
     Tables tables = read_tables(job.output);
-    const Digest expected = configuration_hash(plan), found = configuration_hash(tables);
-    if (expected != found)
-        throw Error("{}: expected configuration {}, found {}: it belongs to another job", job.output, hex(expected),
-                    hex(found));
+    if (configuration_hash(plan) != configuration_hash(tables)) {
+        const std::string difference = job_difference(plan, tables);
+        throw Error("{}: it belongs to another job: {}", job.output,
+                    difference.empty() ? "expected the options of this job, found others" : difference);
+    }
     return tables;
 }
 
 /// A kept slice; what it took is not known, what it should have taken is.
-Refinable refinable(const Request& request, const ShardFolder& folder, const SliceId& id) {
+Refinable refinable(const Request& request, const SliceFolder& folder, const SliceId& id) {
     std::string why;
     const std::optional<Slice> slice = folder.read(id, why);
     if (!slice) throw Error("{}: damaged: {}", folder.file_of(id), why);
@@ -76,14 +80,14 @@ Refinable refinable(const Request& request, const ShardFolder& folder, const Sli
 }
 
 /// Solves what `slices` misses and keeps it; with a time budget coarsely first, then where error falls most.
-void solve(const Job& job, const SliceSolver& solver, const ShardFolder& folder, const std::vector<SliceId>& slices,
+void solve(const Job& job, const SliceSolver& solver, const SliceFolder& folder, const std::vector<SliceId>& slices,
            const std::vector<bool>& kept) {
     const double start = omp_get_wtime(), budget = job.request.time_budget;
     std::vector<SliceId> missing;
     std::vector<Refinable> coarse;
     std::size_t cells = 0, done = 0;
     for (std::size_t i = 0; i < slices.size(); ++i) {
-        const std::size_t count = slice_cells(table_of(solver.plan(), slices[i].table));
+        const std::size_t count = slice_cells(solver.plan().at(slices[i].table));
         cells += count;
         if (!kept[i]) {
             missing.push_back(slices[i]);
@@ -110,13 +114,13 @@ void solve(const Job& job, const SliceSolver& solver, const ShardFolder& folder,
            [&](const SliceId& id, const Slice& slice) { folder.write(id, slice); });
 }
 
-std::size_t count_kept(const ShardFolder& folder, const std::vector<SliceId>& slices) {
+std::size_t count_kept(const SliceFolder& folder, const std::vector<SliceId>& slices) {
     std::size_t count = 0;
     for (const SliceId& id : slices) count += std::filesystem::exists(folder.file_of(id));
     return count;
 }
 
-void interrupted_if_asked(const ShardFolder& folder, const std::vector<SliceId>& slices) {
+void interrupted_if_asked(const SliceFolder& folder, const std::vector<SliceId>& slices) {
     if (stop)
         throw Interrupted(caught, "interrupted: {} of {} slices kept in {}; go on with --resume",
                           count_kept(folder, slices), slices.size(), folder.path());
@@ -124,7 +128,7 @@ void interrupted_if_asked(const ShardFolder& folder, const std::vector<SliceId>&
 
 }  // namespace
 
-Tables assemble(const ShardFolder& folder, const Tables& plan) {
+Tables assemble(const SliceFolder& folder, const Tables& plan) {
     Tables tables = plan;
     for (auto* table : {&tables.azimuthal, &tables.longitudinal})
         if (*table) (*table)->allocate();
@@ -139,51 +143,52 @@ Tables assemble(const ShardFolder& folder, const Tables& plan) {
 
 JobReport run_job(const Job& job) {
     const Interrupts interrupts;
-    if (std::filesystem::is_directory(job.output))
-        throw Error("{}: expected the name of a file, found a folder", job.output);
+    const Output output(job.output, job.inputs);
+    output.require_plain();  // slices are kept beside it
+    check_name(SliceFolder::beside(job.output));
     const SliceSolver solver(job.request);
     const Tables& plan = solver.plan();
-    ShardFolder folder(ShardFolder::beside(job.output), plan);
+    SliceFolder folder(SliceFolder::beside(job.output), plan);
     JobReport report;
-    report.shards = folder.path();
+    report.folder = folder.path();
     const std::vector<SliceId> all = slices_of(plan);
-    const std::vector<SliceId> slices = job.shard ? share_of(job.request, all, *job.shard) : by_cost(job.request, all);
+    const std::vector<SliceId> slices = job.share ? share_of(job.request, all, *job.share) : by_cost(job.request, all);
     report.slices = slices.size();
     if (job.resume)
         if (auto tables = finished(job, plan)) {
             report.tables = std::move(*tables);
             report.was_complete = true;
             report.kept = slices.size();
-            if (!job.shard && std::filesystem::exists(folder.path())) {  // killed between the last two steps
+            if (!job.share && std::filesystem::exists(folder.path())) {  // killed between the last two steps
                 folder.open(true);
                 folder.remove();
             }
             return report;
         }
-    if (!job.resume && !job.shard && !folder.files().empty())
+    if (!job.resume && !job.share && !folder.files().empty())
         throw Error("{}: holds slices of an earlier run; go on with --resume, or delete it", folder.path());
-    folder.open(!job.shard);
+    folder.open(!job.share);
     try {
         const std::vector<bool> kept = folder.kept(slices);
         report.kept = static_cast<std::size_t>(std::count(kept.begin(), kept.end(), true));
-        if (job.shard && !job.resume && report.kept > 0)
+        if (job.share && !job.resume && report.kept > 0)
             throw Error("{}: holds {} of this worker's {} slices already; go on with --resume, or delete it",
                         folder.path(), report.kept, slices.size());
         solve(job, solver, folder, slices, kept);
         interrupted_if_asked(folder, slices);
-        if (job.shard) {
+        if (job.share) {
             report.tables = plan;
             return report;
         }
         report.tables = assemble(folder, plan);
         interrupted_if_asked(folder, slices);
-        write_tables(job.output, report.tables, job.compression, folder.scratch());
+        write_tables(output, report.tables, job.compression, folder.scratch());
     } catch (const Interrupted&) {
         throw;
     } catch (const Error& error) {
         const std::size_t count = count_kept(folder, slices);
         folder.remove_if_empty();
-        if (count == 0 || job.shard) throw;
+        if (count == 0 || job.share) throw;
         throw Error("{}; {} of {} slices kept in {}, go on with --resume", error.what(), count, slices.size(),
                     folder.path());
     }

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "tables/job/schedule.hpp"
 #include "tables/job/simulate.hpp"
+#include "tables/job/worker_share.hpp"
 #include "tables/store/slice_files.hpp"
 #include "tables/store/tables_file.hpp"
 
@@ -15,8 +15,9 @@ namespace medulla::tables {
 struct Job {
     Request request;
     std::string output;
+    std::vector<std::string> inputs;  ///< files that the request was read from: the output is none of them
     bool resume = false;
-    std::optional<Shard> shard;  ///< a worker: solves its share, writes shards only
+    std::optional<WorkerShare> share;  ///< a worker: solves its share and writes slice files only
     ProgressMode progress = ProgressMode::automatic;
     Compression compression = Compression::zstd;
 };
@@ -24,7 +25,7 @@ struct Job {
 struct JobReport {
     Tables tables;              ///< of the whole job; of a worker its axes only
     bool was_complete = false;  ///< the output was there already, of the same configuration
-    std::string shards;         ///< folder
+    std::string folder;         ///< of the slice files
     std::size_t slices = 0;     ///< of the job, or of the worker's share
     std::size_t kept = 0;       ///< of these, found kept
 };
@@ -32,7 +33,7 @@ struct JobReport {
 /// Runs a job. Throws Interrupted on SIGINT or SIGTERM, Error where it could not be done; both say what is kept.
 JobReport run_job(const Job& job);
 
-/// Tables from the kept slices of a shard folder; throws Error if one is missing or damaged.
-Tables assemble(const ShardFolder& folder, const Tables& plan);
+/// Tables from the slices kept in a folder; throws Error if one is missing or damaged.
+Tables assemble(const SliceFolder& folder, const Tables& plan);
 
 }  // namespace medulla::tables

@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "tables/streams.hpp"
 
 namespace medulla::tables {
 
@@ -43,14 +45,14 @@ void Progress::print(bool last) {
              : (rate > 0 ? fmt::format("{} left", duration_text(static_cast<double>(total_ - done_) / rate)) : "");
     const std::string counts = fmt::format("{}/{} cells, {:.3g} cells/s, {}", done_, total_, rate, left);
     if (mode_ == ProgressMode::plain) {
-        fmt::print(stderr, "{}: {}\n", label_, counts);
+        message(STDERR_FILENO, fmt::format("{}: {}\n", label_, counts), Patience::none);
         return;
     }
     constexpr std::size_t width = 28;
-    const std::size_t full = width * done_ / total_;
-    fmt::print(stderr, "\r{} [{}{}] {}\033[K{}", label_, std::string(full, '#'), std::string(width - full, '.'), counts,
-               last ? "\n" : "");
-    std::fflush(stderr);
+    const std::size_t full = std::min(width, width * done_ / total_);
+    const std::string bar = fmt::format("\r{} [{}{}] {}\033[K{}", label_, std::string(full, '#'),
+                                        std::string(width - full, '.'), counts, last ? "\n" : "");
+    message(STDERR_FILENO, bar, Patience::none);
 }
 
 std::string duration_text(double seconds) {

@@ -1,4 +1,4 @@
-// What a long job tells its user: cells done, rate, time left. Goes to standard error only.
+// Progress of a long job on standard error: cells done, rate, time left.
 #pragma once
 
 #include <chrono>

@@ -1,6 +1,9 @@
 #include "tables/job/request.hpp"
 
+#include <algorithm>
+
 #include "tables/error.hpp"
+#include "tables/store/slices.hpp"
 
 namespace medulla::tables {
 
@@ -11,17 +14,8 @@ Method method_of(const std::string& name) {
 }
 
 const char* name_of(Method method) {
-    switch (method) {
-        case Method::automatic:
-            return "auto";
-        case Method::analog:
-            return "analog";
-        case Method::mc:
-            return "mc";
-        case Method::deterministic:
-            return "deterministic";
-    }
-    return "?";
+    constexpr const char* names[] = {"auto", "analog", "mc", "deterministic"};
+    return names[static_cast<std::size_t>(method)];
 }
 
 Request default_request() {
@@ -50,9 +44,17 @@ void check_request(const Request& request) {
         throw Error("--sigma-range: expected at most {:g}, found {:g}", greatest_radius, request.sigma.values.back());
     if (request.bins < 8 || request.bins > 4096 || request.bins % 2 != 0)
         throw Error("--bins: expected an even number from 8 to 4096, found {}", request.bins);
-    const int most_bits = request.method == Method::analog ? 40 : 35;  // what the tracers have random numbers for
-    if (request.paths < 1 || request.paths > (std::uint64_t{1} << most_bits))
-        throw Error("--paths: expected 1 to 2^{}, found {}", most_bits, request.paths);
+    const int fewer_bits = request.method == Method::analog ? 0 : 5;  // of random numbers than the analog tracer has
+    if (request.paths < 1 || request.paths > most_paths >> fewer_bits)
+        throw Error("--paths: expected 1 to {}, found {}", most_paths >> fewer_bits, request.paths);
+    const std::size_t most =
+        std::max(request.h.size() * std::max<std::size_t>(request.absorption.size(), 1), request.theta_i.size()) *
+        request.bins;
+    if (most > most_slice_values)
+        throw Error(
+            "--bins: expected at most {} numbers in a slice (--h-range, --absorption-range or --theta-range times "
+            "--bins), found {}",
+            most_slice_values, most);
     if (request.target_error != 0 && !(request.target_error >= least_target && request.target_error <= greatest_target))
         throw Error("--target-error: expected {:g} to {:g}, found {:g}", least_target, greatest_target,
                     request.target_error);

@@ -8,7 +8,7 @@
 namespace medulla::tables {
 namespace {
 
-/// Marks the nodes around [low, high] and one more on either side.
+/// Marks the nodes around [low, high], and one more on either side.
 void mark(const Axis& axis, double low, double high, std::vector<bool>& needed) {
     const auto begin = axis.values.begin(), end = axis.values.end();
     const auto above = std::upper_bound(begin, end, low) - begin, beyond = std::lower_bound(begin, end, high) - begin;
@@ -52,8 +52,8 @@ Request restrict_to(const Request& request, const std::vector<Material>& materia
                             low, high, least, greatest);
             if (low < least || high > greatest)
                 notes.push_back(
-                    fmt::format("{}: needs {} {:g} .. {:g}, the axis has {:g} .. {:g}: beyond, lobes are "
-                                "those of its end",
+                    fmt::format("{}: needs {} {:g} .. {:g}, the axis has {:g} .. {:g}: values are clamped "
+                                "to its ends",
                                 name, axis.name, low, high, least, greatest));
             mark(axis, low, high, needed);
         };

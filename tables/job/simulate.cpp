@@ -10,14 +10,14 @@
 #include "sim2d/slab/deterministic.hpp"
 #include "sim2d/tracer/tracer.hpp"
 #include "tables/error.hpp"
-#include "tables/job/schedule.hpp"
+#include "tables/job/cost.hpp"
 #include "tables/parallel.hpp"
 
 namespace medulla::tables {
 namespace {
 
-/// A cell's random numbers belong to its parameters, not to its place in a table: the same cell in another table, or
-/// in a part of one, gets the same path set.
+/// Key of a cell's random numbers. It depends on the cell's parameters, not on its position in a table, so that the
+/// same cell in another table, or in a part of one, gets the same paths.
 std::uint64_t cell_key(std::uint64_t kind, std::initializer_list<double> parameters) {
     const auto mix = [](std::uint64_t z) {  // splitmix64's finaliser
         z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -45,10 +45,10 @@ void store(Slice& slice, std::size_t cell, const sim2d::Profile& profile) {
     slice.mean_length[cell] = profile.mean_length;
 }
 
-/// When a cell is done.
+/// Stopping rule of a cell.
 struct Goal {
     double target_error;  ///< relative L2 of a lobe; 0: after `paths`
-    std::uint64_t paths;  ///< of the random methods: exactly these, or with a target at most
+    std::uint64_t paths;  ///< of the random methods; with a target: at most
 };
 
 Goal goal_of(const Request& request, double target_error) {
@@ -57,27 +57,28 @@ Goal goal_of(const Request& request, double target_error) {
 
 double worst_error(const sim2d::Profile& p) { return p.standard_error; }
 double worst_error(const sim2d::SlabProfile& p) { return std::max(p.back.standard_error, p.forward.standard_error); }
-/// One offset of the disc, at every absorption.
+/// One offset of the disc, for every absorption.
 double worst_error(const std::vector<sim2d::Profile>& cells) {
     double e = 0;
     for (const sim2d::Profile& p : cells) e = std::max(e, worst_error(p));
     return e;
 }
 
-/// Analog paths from the first one on, until the error is at most the target: as many as counting says are missing.
+/// Runs the analog tracer, starting again with the number of paths that counting statistics predict, until the error is
+/// at most the target.
 template <class Trace>
 auto count_until(const Goal& goal, Trace&& trace) {
     for (std::uint64_t paths = goal.target_error > 0 ? 4096 : goal.paths;;) {
         auto counted = trace(paths);
         const double ratio = worst_error(counted) / goal.target_error;
         if (goal.target_error == 0 || ratio <= 1 || paths >= goal.paths) return counted;
-        // An error of few counts is rough: no more than 64 times as many at once.
+        // An error estimate from few counts is rough: at most 64 times as many at once.
         const double wanted = std::clamp(1.05 * ratio * ratio, 2.0, 64.0) * static_cast<double>(paths);
         paths = static_cast<std::uint64_t>(std::min(wanted, static_cast<double>(goal.paths)));
     }
 }
 
-/// Relative L2 error that counting `paths` exits would leave on a lobe: sum p (1 - p) / (n sum p^2), p the bins'
+/// Relative L2 error of a lobe from counting `paths` exits: sum p (1 - p) / (n sum p^2), p the bins'
 /// shares.
 double counting_error(const sim2d::Profile& profile, std::uint64_t paths) {
     double sum = 0, squares = 0;
@@ -85,7 +86,7 @@ double counting_error(const sim2d::Profile& profile, std::uint64_t paths) {
     return std::sqrt((sum * sum / squares - 1) / static_cast<double>(paths));
 }
 
-/// What the noise-free solver's error of a cell is held against before `auto` traces it.
+/// `auto` traces a cell whose noise-free error estimate exceeds this.
 double error_of_paths(const sim2d::Profile& p, const Goal& goal) {
     return goal.target_error > 0 ? goal.target_error : counting_error(p, goal.paths);
 }
@@ -98,11 +99,11 @@ double error_of_paths(const std::vector<sim2d::Profile>& cells, const Goal& goal
     return e;
 }
 
-/// A slice's solvers: `exact(aim)` gives all cells without noise, `walk(i, goal)` one cell by the fast random solver,
-/// `count(i, paths)` one by the analog tracer.
-template <class Exact, class Walk, class Count>
+/// Solves the cells of a slice: `exact(aim)` gives all cells without noise, `trace(i, goal)` one cell by the fast
+/// random solver, `count(i, paths)` one cell by the analog tracer.
+template <class Exact, class Trace, class Count>
 auto solve_cells(const Request& request, bool grids_reach, double target_error, std::size_t count_of_cells,
-                 Exact&& exact, Walk&& walk, Count&& count) {
+                 Exact&& exact, Trace&& trace, Count&& count) {
     using Profiles = decltype(exact(0.0));
     const Goal goal = goal_of(request, target_error);
     Profiles solved;
@@ -112,7 +113,7 @@ auto solve_cells(const Request& request, bool grids_reach, double target_error, 
         return solved;
     }
     if (request.method == Method::mc || (request.method == Method::automatic && !grids_reach)) {
-        for (std::size_t i = 0; i < count_of_cells; ++i) solved.push_back(walk(i, goal).profile);
+        for (std::size_t i = 0; i < count_of_cells; ++i) solved.push_back(trace(i, goal).profile);
         return solved;
     }
     const auto worst = [](const Profiles& cells) {
@@ -122,24 +123,24 @@ auto solve_cells(const Request& request, bool grids_reach, double target_error, 
     };
     double aim = target_error > 0 ? target_error : sim2d::DiscOptions{}.target_error;
     solved = exact(aim);
-    // Grids are chosen for an error; where their own estimate is above it they are chosen again, finer.
+    // Grids are chosen for an error; if their error estimate is larger, finer ones are tried.
     for (int again = 0; again < 4 && target_error > 0 && worst(solved) > target_error; ++again) {
         aim = std::max(least_target, aim * std::min(0.7, target_error / worst(solved)));
         Profiles finer = exact(aim);
         if (!(worst(finer) < worst(solved))) break;
         solved = std::move(finer);
     }
-    // Walks have no deadline: with a budget grids are what there is.
+    // Tracing has no deadline, so with a time budget the grids' result is final.
     if (request.method == Method::deterministic || request.time_budget > 0) return solved;
     for (std::size_t i = 0; i < count_of_cells; ++i) {
         if (worst_error(solved[i]) <= error_of_paths(solved[i], goal)) continue;
-        auto traced = walk(i, goal).profile;
+        auto traced = trace(i, goal).profile;
         if (worst_error(traced) < worst_error(solved[i])) solved[i] = std::move(traced);
     }
     return solved;
 }
 
-/// The slab's modes of each g: made once, by the first slice that needs them, and shared by every sigma.
+/// The slab's modes of each g: computed by the first slice that needs them and shared by every sigma.
 class SlabsByG {
   public:
     explicit SlabsByG(const std::vector<double>& g) : g_(g), made_(g.size()), solvers_(g.size()) {}
@@ -155,7 +156,7 @@ class SlabsByG {
     std::vector<std::optional<sim2d::SlabSolver>> solvers_;
 };
 
-/// Program, version and compiler: another compiler may round otherwise.
+/// Program, version and compiler, since another compiler may round differently.
 std::string program_text() { return "medulla " MEDULLA_VERSION " (" MEDULLA_COMPILER ")"; }
 
 void begin(Table& table, const Request& request) {
@@ -163,7 +164,7 @@ void begin(Table& table, const Request& request) {
     table.seed = request.seed, table.paths = request.paths;
     table.target_error = request.target_error, table.time_budget = request.time_budget;
     if (request.method == Method::deterministic) table.seed = table.paths = 0;
-    if (request.target_error > 0 || request.time_budget > 0) table.paths = 0;  // as many as it takes
+    if (request.target_error > 0 || request.time_budget > 0) table.paths = 0;  // unlimited
 }
 
 }  // namespace
@@ -174,7 +175,7 @@ Tables plan_of(const Request& request) {
     plan.program = program_text();
     if (request.azimuthal) {
         plan.azimuthal.emplace();
-        plan.azimuthal->name = "azimuthal";
+        plan.azimuthal->id = TableId::azimuthal;
         plan.azimuthal->axes = {request.sigma, request.g, request.h, exit_axis("phi", request.bins)};
         if (request.absorption.size() > 0)
             plan.azimuthal->axes.insert(plan.azimuthal->axes.begin() + 2, request.absorption);
@@ -182,7 +183,7 @@ Tables plan_of(const Request& request) {
     }
     if (request.longitudinal) {
         plan.longitudinal.emplace();
-        plan.longitudinal->name = "longitudinal";
+        plan.longitudinal->id = TableId::longitudinal;
         plan.longitudinal->axes = {
             request.sigma, request.g, request.theta_i, {"side", {0, 1}}, exit_axis("theta_r", request.bins / 2)};
         begin(*plan.longitudinal, request);
@@ -274,8 +275,8 @@ const Tables& SliceSolver::plan() const { return state_->plan; }
 Slice SliceSolver::solve(const SliceId& id) const { return solve(id, state_->request.target_error); }
 
 Slice SliceSolver::solve(const SliceId& id, double target_error) const {
-    return id.table == TableName::azimuthal ? state_->azimuthal(id, target_error)
-                                            : state_->longitudinal(id, target_error);
+    return id.table == TableId::azimuthal ? state_->azimuthal(id, target_error)
+                                          : state_->longitudinal(id, target_error);
 }
 
 Tables simulate(const Request& request, ProgressMode mode) {

@@ -1,5 +1,5 @@
-// Request -> tables: solves (sigma, g) slices with the solver that the method names. A slice depends on the request
-// alone, not on other slices, threads or timing.
+// Request -> tables: solves (sigma, g) slices with the solver of the requested method. A slice depends only on the
+// request, not on other slices, threads or timing.
 #pragma once
 
 #include <memory>
@@ -11,15 +11,15 @@
 
 namespace medulla::tables {
 
-/// In denser discs than this `auto` walks from the start. Seconds to 1e-2 by walks and by grids: at sigma 30, g 0.9
-/// 0.25 and 0.07, at sigma 100 0.4 and 3, at sigma 100, g 0.99 5 and 140 (docs/accuracy.md).
+/// In denser discs `auto` traces paths without trying grids. Seconds for an error of 1e-2 by paths and by grids: 0.25
+/// and 0.07 at sigma 30, g 0.9; 0.4 and 3 at sigma 100, g 0.9; 5 and 140 at sigma 100, g 0.99 (docs/accuracy.md).
 inline constexpr double greatest_grid_sigma = 50;
 
-/// Axes, methods, seeds of what a request asks for, its arrays not allocated. Throws Error if no solver can answer.
+/// The tables of a request with their axes, methods and seeds, without arrays. Throws Error as check_request.
 Tables plan_of(const Request& request);
 
-/// Solves slices of one request. What depends on g alone is made on first use and shared. Threads may call `solve` at
-/// the same time.
+/// Solves slices of one request. Data that depend on g only are computed on first use and shared. Threads may call
+/// `solve` at the same time.
 class SliceSolver {
   public:
     explicit SliceSolver(const Request& request);
@@ -27,7 +27,7 @@ class SliceSolver {
 
     const Tables& plan() const;
     Slice solve(const SliceId& id) const;
-    /// The same slice to another error; 0: by the request's paths, or to the noise-free solvers' usual error.
+    /// The same slice for another error; 0: with the request's paths, or the default error of the noise-free solvers.
     Slice solve(const SliceId& id, double target_error) const;
 
   private:

@@ -1,4 +1,5 @@
 #include "tables/pack/compress.hpp"
+#include "tables/store/json_text.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -15,29 +16,30 @@ namespace medulla::tables {
 namespace {
 
 constexpr int rank_step = static_cast<int>(rank_multiple), greatest_rank = static_cast<int>(max_rank);
-/// Bits that a number takes on average where rounding is in balance with components left out, before solves say better,
-/// and where more components would not pay.
+/// Average bits per number: where rounding balances truncated components (an estimate before any solve), and where more
+/// components would gain less than more bits.
 constexpr double usual_bits = 9, ample_bits = 12.5;
-/// Of the energies: more rank is only rounding. The slab's have three small axes, the disc's with absorption four. A
-/// small pack spends at most a 17th of its bytes on them.
+/// Rank of the energies: at more, only rounding is left. The slab's have three short axes, the disc's with absorption
+/// four. A small pack spends at most a 17th of its bytes on them.
 int energy_rank(const Part& part, const CompressOptions& options) {
     const int most = part.kind == TableKind::survival ? 48 : 32;
     if (!options.max_bytes) return most;
     const double room = static_cast<double>(*options.max_bytes) / 17 / part.component_bytes(usual_bits);
     return std::clamp(static_cast<int>(room / rank_step) * rank_step, rank_step, most);
 }
-/// Of the solves that say how hard each part is.
+/// Rank of the pilot solves, which measure how hard each part is.
 constexpr int pilot_rank = 32;
-/// Room for the provenance text while components are shared out; what it does not take goes to bits.
+/// Bytes reserved for the provenance text while components are distributed; bits get what it does not use.
 constexpr std::size_t text_room = 800;
-/// Errors of these tables fall about as rank^-2 (docs/accuracy.md), which is all that sharing out components needs.
+/// Errors fall about as rank^-2 in bench/bench_compress (docs/accuracy.md); only the distribution of components uses
+/// it.
 constexpr double decay = 2;
 
 /// Relative L2 standard error of all lobes of one kind together.
 double table_noise(const Table& table, TableKind kind) {
-    const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
+    const std::size_t sides = table.sides();
     double noise = 0, total = 0;
-    for (std::size_t cell = kind == TableKind::longitudinal_forward ? 1 : 0; cell < table.cells(); cell += sides) {
+    for (std::size_t cell = side_of(kind); cell < table.cells(); cell += sides) {
         double norm = 0;
         for (std::size_t b = 0; b < table.bins(); ++b)
             norm += static_cast<double>(table.lobe_of(cell)[b]) * static_cast<double>(table.lobe_of(cell)[b]);
@@ -47,12 +49,12 @@ double table_noise(const Table& table, TableKind kind) {
     return std::sqrt(noise / total);
 }
 
-/// A part, the components it was given, and what came of them.
+/// A part, its rank and the solve at that rank.
 struct Solve {
     const Part* part;
     int rank = 0;
     tensor::CpResult result = {};
-    double error = 0;  ///< relative L2 of the kind, without the exit spline's share
+    double error = 0;  ///< relative L2 of the kind, without the exit spline's part
 
     /// Error expected at another rank.
     double expected(double other) const { return error * std::pow(other / rank, -decay); }
@@ -61,14 +63,15 @@ using Solves = std::vector<Solve>;
 
 PackedTable pack_kind(const Solves& solves, std::size_t first, std::size_t last, std::pair<float, float> range);
 
-/// Relative L2 error of one kind's lobes as a pack gives them: normalised and held at 0.
+/// Relative L2 error of one kind's lobes as evaluated from a pack: normalised and clamped to 0.
 double error_in_pack(const Solve& solve, const Source& tables) {
     std::vector<unsigned char> pack = write_pack({pack_kind({solve}, 0, 1, {0, 0})}, "{}");
     return compare(tables, *pack_source(std::move(pack), "the new pack")).at(0).relative;
 }
 
-/// Decomposes every part that has a rank and no model of it. Parts are independent: the same bytes for any threads.
-/// Non-negative factors, fitted to whole lobes, miss their integral, which the pack mends: its error is theirs.
+/// Decomposes every part that has a rank but no model of that rank. Parts are independent, so the result does not
+/// depend on the number of threads. Non-negative factors are fitted to whole lobes without their integral, which the
+/// pack normalises: their error is that of the pack.
 void run(Solves& solves, const CompressOptions& options, bool pilot, const Source* tables) {
     std::vector<char> renewed(solves.size(), 0);
     // Dynamic scheduling takes them in order; the last kinds are the longest.
@@ -83,9 +86,9 @@ void run(Solves& solves, const CompressOptions& options, bool pilot, const Sourc
             settings.restarts = 1;
         else
             settings.max_sweeps = options.max_sweeps;
-        // Energies are small to solve, and nothing else states them.
+        // Energies are fast to solve, and nothing else corrects their errors.
         if (!solve.part->lobes()) settings.max_sweeps = std::max(400, options.max_sweeps.value_or(0));
-        // The slab's energies are no densities: nothing asks their factors to be non-negative.
+        // Energies are no densities: their factors need not be non-negative.
         const bool signed_factors = !solve.part->lobes() && options.solver == tensor::Solver::nonnegative;
         solve.result = tensor::cp(solve.part->values, signed_factors ? tensor::Solver::lm : options.solver, settings);
         solve.error = solve.part->share * solve.result.report.relative_error;
@@ -100,7 +103,7 @@ void run(Solves& solves, const CompressOptions& options, bool pilot, const Sourc
 
 int padded(int rank) { return static_cast<int>(padded_rank(static_cast<std::uint32_t>(rank))); }
 
-/// Components of a kind as they are stored.
+/// Number of stored components of a kind.
 int stored_rank(const Solves& solves, TableKind kind) {
     int sum = 0;
     for (const Solve& solve : solves)
@@ -108,7 +111,7 @@ int stored_rank(const Solves& solves, TableKind kind) {
     return sum;
 }
 
-/// [first, last) of each kind's solves, which stand together.
+/// Range [first, last) of each kind's solves, which are adjacent.
 std::vector<std::pair<std::size_t, std::size_t>> kinds_of(const Solves& solves) {
     std::vector<std::pair<std::size_t, std::size_t>> ranges;
     for (std::size_t i = 0; i < solves.size(); ++i) {
@@ -118,14 +121,14 @@ std::vector<std::pair<std::size_t, std::size_t>> kinds_of(const Solves& solves) 
     return ranges;
 }
 
-/// Real-valued ranks that minimise the sum of squared errors for a price of `lambda` a byte: with errors falling as
-/// rank^-decay, rank^(2 decay + 1) is proportional to error^2 / (bytes of a component, about).
+/// Real-valued rank that minimises the sum of squared errors at 1 / lambda per byte: with errors falling as
+/// rank^-decay, rank^(2 decay + 1) is proportional to error^2 / (bytes of a component).
 double share_of(const Solve& solve, double lambda) {
     const double unit = solve.error * std::pow(solve.rank, decay);
     return std::pow(lambda * unit * unit / solve.part->component_bytes(usual_bits), 1 / (2 * decay + 1));
 }
 
-/// Greatest lambda for which fits(lambda), by bisection of its logarithm; `fits` is monotone and true for little.
+/// Largest lambda with fits(lambda), by bisection of its logarithm; `fits` is monotone and true for small values.
 template <class Fits>
 double greatest(Fits fits) {
     double low = -60, high = 120;
@@ -144,7 +147,7 @@ PackedTable pack_kind(const Solves& solves, std::size_t first, std::size_t last,
     return join(parts, models, range);
 }
 
-/// Bytes of a pack with these ranks and so many bits a number on average.
+/// Bytes of a pack with these ranks and `bits` per number on average.
 std::size_t pack_bytes(const Solves& solves, double bits) {
     std::vector<PackedTable> tables;
     double more = 0;  // than 8 bits
@@ -174,9 +177,9 @@ void share_bytes(Solves& solves, std::size_t bytes, double bits) {
         set(lambda);
         return pack_bytes(solves, bits) <= bytes;
     };
-    if (!fits(0)) return;  // the least ranks there are; compress() says whether their pack is too large
+    if (!fits(0)) return;  // the smallest ranks; compress() reports whether their pack is too large
     set(greatest(fits));
-    // What rounding down left over goes where it helps most.
+    // Bytes left over by rounding down go where they help most.
     for (;;) {
         std::size_t best = solves.size();
         double most = 0;
@@ -195,23 +198,23 @@ void share_bytes(Solves& solves, std::size_t bytes, double bits) {
     }
 }
 
-/// Solves of great ranks take seconds, and a hundred steps do not bring them to their optimum.
+/// Solves of high rank take seconds, and a hundred steps do not reach their optimum.
 bool too_large(const Solves& solves, const CompressOptions& options) {
     return !options.max_sweeps &&
            std::any_of(solves.begin(), solves.end(), [](const Solve& solve) { return solve.rank > 96; });
 }
 
-/// By what the pilots say; where solves would be too large, bytes go to bits.
+/// Distributes bytes by the pilots' errors; where ranks would be too large, bytes are spent on bits instead.
 void share_first(Solves& solves, const CompressOptions& options) {
     const Solves pilots = solves;
     share_bytes(solves, *options.max_bytes, usual_bits);
     if (too_large(solves, options)) share_bytes(solves = pilots, *options.max_bytes, ample_bits);
 }
 
-/// Rows of exit splines that are far finer than a kind's expected error are bytes that more components use better:
-/// takes the coarsest of a few splines that leave a third of it. What a pilot said of a part holds for its coarser one.
-/// @param shared ranks that bytes were shared out to   @param pilots those of changed parts lose their models
-/// @return whether any changed
+/// Exit splines far finer than a kind's expected error waste bytes: takes the coarsest of a few splines whose error is
+/// at most a third of it. The pilot's error of a part is used for its coarser one as well.
+/// @param shared ranks after the distribution of bytes   @param pilots those of changed parts lose their models
+/// @return whether any part changed
 bool coarsen_exits(const Tables& tables, const ExitSpans& spans, std::vector<Part>& parts, const Solves& shared,
                    Solves& pilots) {
     bool changed = false;
@@ -244,8 +247,7 @@ double kind_error(const Solves& solves, std::size_t first, std::size_t last) {
     return std::sqrt(sum);
 }
 
-/// The solves as tables of a pack, each block as wide as the options say; lobes within max_bytes take what is left of
-/// it.
+/// The solves as tables of a pack, with the bits that the options require; with max_bytes, lobes get the bytes left.
 std::vector<PackedTable> pack_tables(const Solves& solves, const CompressOptions& options, std::size_t text_bytes) {
     std::vector<PackedTable> tables;
     for (const auto& [first, last] : kinds_of(solves)) tables.push_back(pack_kind(solves, first, last, {0, 0}));
@@ -268,8 +270,8 @@ std::vector<PackedTable> pack_tables(const Solves& solves, const CompressOptions
 
 /// Squared errors of a pack's lobes.
 struct Balance {
-    double components = 0, rounding = 0;  ///< what components left out and what rounding makes of them
-    double bits = 0;                      ///< of a number on average
+    double components = 0, rounding = 0;  ///< from truncated components and from rounding
+    double bits = 0;                      ///< per number on average
 };
 Balance balance_of(const Solves& solves, const CompressOptions& options) {
     const std::vector<PackedTable> tables = pack_tables(solves, options, text_room);
@@ -286,7 +288,7 @@ Balance balance_of(const Solves& solves, const CompressOptions& options) {
     return sum;
 }
 
-/// Shares out again with what the solves at these ranks say in the pilots' place, as long as that lowers the errors.
+/// Distributes again with the errors of the solves in place of the pilots', as long as that lowers the total error.
 void share_again(Solves& solves, const CompressOptions& options, const Source* tables) {
     Balance now = balance_of(solves, options);
     for (int tries = 0; tries < 4 && !too_large(solves, options); ++tries) {
@@ -300,8 +302,8 @@ void share_again(Solves& solves, const CompressOptions& options, const Source* t
     }
 }
 
-/// Least ranks on the steps of the format that keep `error`: predicted from the last solve, solved, and predicted again
-/// until the prediction stands.
+/// Smallest ranks, in steps of the format, with at most `error`: predicted from the last solve, solved, and predicted
+/// again until the prediction is confirmed.
 void solve_to(Solves& solves, double error, const CompressOptions& options, const Source* tables) {
     for (const auto& [first, last] : kinds_of(solves)) {
         if (!solves[first].part->lobes()) {
@@ -315,7 +317,7 @@ void solve_to(Solves& solves, double error, const CompressOptions& options, cons
             throw Error("--max-error: the exit splines of the {} leave {:.2e}, expected {:.2e}",
                         name_of(solves[first].part->kind), std::sqrt(spline), error);
         Solves best;
-        // Components are counted as they are stored: whole non-negative lobes take two for each.
+        // Counts stored components: whole non-negative lobes store two per component.
         const int copies = solves[first].part->copies(), step = rank_step * copies;
         int least = 2 * greatest_rank, floor = 0;
         for (int tries = 0; tries < 8; ++tries) {
@@ -337,9 +339,9 @@ void solve_to(Solves& solves, double error, const CompressOptions& options, cons
                 solve.rank = std::clamp(solve.rank, rank_step, greatest_rank / copies - others);
                 total += solve.rank * copies;
             }
-            // Between a total that was too small and one that was enough there is nothing left to try.
+            // Between a total that was too small and one that sufficed nothing is left to try.
             if (total >= least || total > greatest_rank) total = std::min(least - step, greatest_rank);
-            // Every part keeps components: without any it would be all error.
+            // Every part needs at least one block of components.
             if (total <= floor || total < step * static_cast<int>(next.size())) break;
             while (stored_rank(next, next[0].part->kind) > total)
                 std::max_element(next.begin(), next.end(), [](const Solve& a, const Solve& b) {
@@ -369,7 +371,7 @@ std::string provenance(const Tables& tables, const CompressOptions& options, con
     json["input"] = input;
     json["seed"] = options.seed;
     for (const Table* table : tables.present()) {
-        nlohmann::ordered_json& out = json["tables"][table->name];
+        nlohmann::ordered_json& out = json["tables"][table->name()];
         out = {{"method", table->method}, {"seed", table->seed}, {"paths", table->paths}};
         if (table->target_error > 0) out["target_error"] = table->target_error;
         if (table->time_budget > 0) out["time_budget"] = table->time_budget;
@@ -381,14 +383,12 @@ std::string provenance(const Tables& tables, const CompressOptions& options, con
         fit["relative_l2"] = report.fit_error;
         fit["input_noise"] = report.noise;
     }
-    return json.dump();
+    return json_line(json);
 }
 
 std::pair<float, float> range_of(const Part& part, const Tables& tables) {
     std::vector<double> values = part.values.values;
-    if (part.lobes())
-        values = side_lobes(part.kind == TableKind::azimuthal ? *tables.azimuthal : *tables.longitudinal,
-                            part.kind == TableKind::longitudinal_forward ? 1 : 0);
+    if (part.lobes()) values = side_lobes(tables.at(table_of(part.kind)), side_of(part.kind));
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
     return {static_cast<float>(*low), static_cast<float>(*high)};
 }
@@ -404,9 +404,7 @@ TableReport report_of(const Solves& solves, std::size_t first, std::size_t last,
         spline += solves[i].part->exit_error * solves[i].part->exit_error;
     }
     report.exit_error = std::sqrt(spline);
-    if (solves[first].part->lobes())
-        report.noise =
-            table_noise(report.kind == TableKind::azimuthal ? *tables.azimuthal : *tables.longitudinal, report.kind);
+    if (solves[first].part->lobes()) report.noise = table_noise(tables.at(table_of(report.kind)), report.kind);
     return report;
 }
 
@@ -428,7 +426,7 @@ CompressResult compress(const Tables& tables, const CompressOptions& options, co
     std::unique_ptr<Source> source;
     if (options.solver == tensor::Solver::nonnegative) source = table_source(tables);
     if (searched) run(solves, options, true, source.get());
-    // Rounding takes its share of the error.
+    // Leaves room for the rounding error.
     if (options.max_error)
         solve_to(solves, *options.max_error / std::sqrt(1 + balanced_rounding), options, source.get());
     if (options.max_bytes) {

@@ -18,7 +18,7 @@ Eigen::RowVectorXd factors_at(const TableView& table, std::uint32_t k, float x) 
     return values;
 }
 
-/// At the nodes, which are the breakpoints.
+/// Factors at the nodes, which are the breakpoints.
 Eigen::MatrixXd parameter_factors(const TableView& table, std::uint32_t k) {
     const std::uint32_t nodes = std::min(table.layout.axes[k].nodes, table.layout.axes[k].spans + 1);
     Eigen::MatrixXd values(nodes, table.layout.rank_stride);
@@ -27,7 +27,7 @@ Eigen::MatrixXd parameter_factors(const TableView& table, std::uint32_t k) {
     return values;
 }
 
-/// At four Gauss points of every span, on both halves, so that inner products of cubics are integrals.
+/// Factors at four weighted Gauss points of every span, on both halves: inner products are exact integrals of cubics.
 Eigen::MatrixXd exit_factors(const TableView& table, std::uint32_t k) {
     const AxisView<float> axis = table.axis(k);
     const double inner = std::sqrt(3.0 / 7 - 2.0 / 7 * std::sqrt(1.2)),

@@ -1,5 +1,5 @@
-// How far the components of a pack cancel, from its bytes alone: what `compress` reports, `diff` and `verify` find
-// again.
+// How strongly the components of a pack cancel, from its bytes alone, so that `diff` and `verify` print what `compress`
+// printed.
 #pragma once
 
 #include <utility>
@@ -10,8 +10,8 @@
 
 namespace medulla::tables {
 
-/// For each table that the pack has, in their order: of all its components, even and odd, as functions on its nodes and
-/// over the whole exit axis.
+/// For each table of the pack, in order: of all its components, even and odd, as functions on the nodes and over the
+/// whole exit axis.
 using PackDegeneracy = std::vector<std::pair<TableKind, tensor::Degeneracy>>;
 PackDegeneracy degeneracy_of(const PackView& pack);
 

@@ -1,4 +1,4 @@
-// A pack as GLSL: its words, and the functions of medulla/lookup.hpp over them.
+// A pack as GLSL: its 32-bit words, and the functions of medulla/lookup.hpp on them.
 #pragma once
 
 #include <string>
@@ -6,9 +6,9 @@
 
 namespace medulla::tables {
 
-/// GLSL of version 3.30 or ES 3.00 on: the valid pack `bytes` as an array, and functions that contract it and look
-/// lobes up, all of whose names begin with `name`. Its sums are those of the runtime, term by term. Throws Error for a
-/// pack that is not laid out in words.
+/// GLSL from version 3.30 or ES 3.00 on: the valid pack `bytes` as an array, and functions that contract it and look up
+/// lobes. All names begin with `name`. Sums have the order of the runtime. Throws Error for a pack whose parts do not
+/// start at 32-bit words.
 std::string glsl_source(const std::vector<unsigned char>& bytes, const std::string& name);
 
 }  // namespace medulla::tables

@@ -32,7 +32,7 @@ void add_parameters(const Table& table, Part& part) {
 }
 
 /// Even or odd halves of lobes [cells][bins] at y > 0. Their sum of squares is half the part's; a middle bin, where
-/// bins are odd in number, is its own mirror image and counts as half a bin.
+/// the number of bins is odd, is its own mirror image and counts as half a bin.
 RowMajor halves(const std::vector<double>& lobes, std::size_t bins, Mirror mirror) {
     const auto n = static_cast<Eigen::Index>(bins), cells = static_cast<Eigen::Index>(lobes.size() / bins);
     const Eigen::Map<const RowMajor> all(lobes.data(), cells, n);
@@ -92,8 +92,8 @@ Part whole_part(const Table& table, TableKind kind, const std::vector<double>& l
     for (std::size_t b = 0; b <= bins; ++b)
         edges.push_back(right.back() * (2 * static_cast<double>(b) / static_cast<double>(bins) - 1));
     const Spline half(right), full(breakpoints);
-    // Free coefficients: an azimuth's last three are its first three again (breakpoints are symmetric, so the mirrored
-    // ghosts are the periodic ones).
+    // Free coefficients: the last three of a periodic axis equal the first three (breakpoints are symmetric, so
+    // mirrored ghost knots are the periodic ones).
     const Eigen::Index turn = kind == TableKind::azimuthal ? full.spans() : full.size();
     Eigen::MatrixXd free = Eigen::MatrixXd::Zero(full.size(), turn);
     for (Eigen::Index i = 0; i < full.size(); ++i) free(i, i % turn) = 1;
@@ -121,8 +121,8 @@ Part whole_part(const Table& table, TableKind kind, const std::vector<double>& l
     return part;
 }
 
-/// Share of the slab's energy that leaves backward. At sigma = 0 nothing leaves: its share there is the limit, taken
-/// from the parabola through the next three nodes (it multiplies an energy of 0, so only its smoothness matters).
+/// Share of the slab's energy that leaves backward. At sigma = 0, where the energy is 0, it is extrapolated by the
+/// parabola through the next three nodes, for smoothness.
 Part energy_part(const Table& table) {
     Part part;
     part.kind = TableKind::back_fraction, part.mirror = Mirror::none;
@@ -142,7 +142,7 @@ Part energy_part(const Table& table) {
     return part;
 }
 
-/// What absorption leaves of the disc's energies, as lengths: exp(-a length) is 1 at a = 0 and below it elsewhere.
+/// Survival of the disc's energy under absorption a, as lengths: exp(-a length) is 1 at a = 0 and smaller elsewhere.
 Part survival_part(const Table& table) {
     Part part;
     part.kind = TableKind::survival, part.mirror = Mirror::even;
@@ -170,7 +170,7 @@ std::vector<double> exit_breakpoints(TableKind kind, std::size_t bins, std::size
     const auto density = [&](double x) {
         return azimuth ? 0.4 / (2 * pi) + 0.4 * planar_hg_pdf(x, 0.85) + 0.2 * planar_hg_pdf(pi - x, 0.8) : 1 / pi;
     };
-    // At least two bins to a span keeps the fit well conditioned. Breakpoints are quantiles of the density, snapped to
+    // Two or more bins per span keep the fit well conditioned. Breakpoints are quantiles of the density, rounded to
     // distinct bin edges.
     const std::size_t half = bins / 2, n = std::clamp<std::size_t>(spans / 2, 3, std::max<std::size_t>(3, half / 2));
     const double start = bins % 2 ? 0.5 : 0.0;  // the first edge beyond 0, in bins
@@ -201,14 +201,10 @@ struct KindLobes {
     double whole;
 };
 KindLobes lobes_of(const Tables& tables, TableKind kind) {
-    const Table& table = kind == TableKind::azimuthal ? *tables.azimuthal : *tables.longitudinal;
-    std::vector<double> lobes = side_lobes(table, kind == TableKind::longitudinal_forward ? 1 : 0);
+    const Table& table = tables.at(table_of(kind));
+    std::vector<double> lobes = side_lobes(table, side_of(kind));
     const double norm = Eigen::Map<const Eigen::VectorXd>(lobes.data(), static_cast<Eigen::Index>(lobes.size())).norm();
     return {table, std::move(lobes), norm};
-}
-
-bool has(const Tables& tables, TableKind kind) {
-    return (kind == TableKind::azimuthal ? tables.azimuthal : tables.longitudinal).has_value();
 }
 
 }  // namespace
@@ -226,7 +222,7 @@ std::vector<Part> lobe_parts_of(const Tables& tables, TableKind kind, std::size_
 std::vector<Part> parts_of(const Tables& tables, const ExitSpans& spans) {
     std::vector<Part> parts;
     for (const TableKind kind : lobe_kinds) {
-        if (!has(tables, kind)) continue;
+        if (!tables[table_of(kind)]) continue;
         for (Part& part : lobe_parts_of(tables, kind, spans[kind])) parts.push_back(std::move(part));
     }
     add_energies(tables, parts);
@@ -236,7 +232,7 @@ std::vector<Part> parts_of(const Tables& tables, const ExitSpans& spans) {
 std::vector<Part> whole_lobes_of(const Tables& tables, const ExitSpans& spans) {
     std::vector<Part> parts;
     for (const TableKind kind : lobe_kinds) {
-        if (!has(tables, kind)) continue;
+        if (!tables[table_of(kind)]) continue;
         const KindLobes all = lobes_of(tables, kind);
         parts.push_back(whole_part(all.table, kind, all.lobes, all.whole, spans[kind]));
     }
@@ -246,7 +242,7 @@ std::vector<Part> whole_lobes_of(const Tables& tables, const ExitSpans& spans) {
 
 namespace {
 
-/// What errors of independent spline coefficients make of a factor's squared length, for one unit of variance each.
+/// Expected squared length of a factor's error for independent errors of unit variance in its spline coefficients.
 double gain_of(const Eigen::MatrixXd& map) {
     return map.completeOrthogonalDecomposition().pseudoInverse().squaredNorm();
 }
@@ -259,7 +255,7 @@ PackedTable join(const std::vector<const Part*>& parts, const std::vector<const 
     int rank = 0;
     for (std::size_t p = 0; p < parts.size(); ++p) rank += models[p]->rank() * parts[p]->copies();
     table.weights.resize(rank), table.rounding.resize(rank);
-    table.twins = parts[0]->copies() == 2;
+    table.paired = parts[0]->copies() == 2;
     for (PackedAxis& axis : table.axes) axis.coefficients.resize(axis.spline.size(), rank);
     int column = 0;
     for (std::size_t p = 0; p < parts.size(); ++p)
@@ -273,14 +269,14 @@ PackedTable join(const std::vector<const Part*>& parts, const std::vector<const 
                 const Eigen::MatrixXd& map =
                     k < part.maps.size() ? part.maps[k] : part.exit_maps[static_cast<std::size_t>(copy)];
                 coefficients.push_back(map * model.factors[k]);
-                // A number is off by up to half a unit, evenly: variance 1 / 12.
+                // Rounding errors are uniform in +-1/2 unit: variance 1 / 12.
                 rounding.array() += gain_of(map) / 12 *
                                     coefficients[k].colwise().lpNorm<Eigen::Infinity>().transpose().array().square();
             }
             rounding.array() *= (unit * model.weights).array().square();
             std::vector<int> order(static_cast<std::size_t>(model.rank()));
             std::iota(order.begin(), order.end(), 0);
-            if (!table.twins)
+            if (!table.paired)
                 std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return rounding[a] > rounding[b]; });
             for (const int r : order) {
                 for (std::size_t k = 0; k < table.axes.size(); ++k)

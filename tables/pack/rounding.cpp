@@ -5,7 +5,7 @@
 namespace medulla::tables {
 namespace {
 
-/// Squared error of the components that block `i` holds, over that of whole numbers of a unit.
+/// Squared error of the components in block `i`, in units of the squared rounding unit.
 double block_rounding(const PackedTable& table, std::uint32_t i) {
     double sum = 0;
     for (Eigen::Index r = 0; r < table.rounding.size(); ++r)
@@ -15,12 +15,12 @@ double block_rounding(const PackedTable& table, std::uint32_t i) {
 
 double squared_unit(std::uint32_t bits) { return std::pow(greatest_of(bits), -2); }
 
-/// Blocks of one table that have the same width.
+/// A block, or a pair of blocks, that is widened as one.
 struct Unit {
     PackedTable* table;
-    std::uint32_t first, twin;  ///< equal where there is no twin
+    std::uint32_t first, second;  ///< equal without a pair
     double rounding;
-    std::size_t step;  ///< bytes of four bits more
+    std::size_t step;  ///< bytes that four more bits take
 
     std::uint32_t& bits() const { return table->bits[first]; }
     double error() const { return rounding * squared_unit(bits()); }
@@ -51,10 +51,10 @@ void set_bits(const std::vector<PackedTable*>& tables, double error, std::size_t
     for (PackedTable* table : tables) {
         const std::uint32_t blocks = table->stride() / rank_multiple;
         table->bits.assign(blocks, 4);
-        for (std::uint32_t i = 0; i < (table->twins ? blocks / 2 : blocks); ++i) {
-            const std::uint32_t twin = table->twins ? i + blocks / 2 : i;
-            const double rounding = block_rounding(*table, i) + (twin != i ? block_rounding(*table, twin) : 0);
-            units.push_back({table, i, twin, rounding, 4 * table->rows() * (twin != i ? 2 : 1)});
+        for (std::uint32_t i = 0; i < (table->paired ? blocks / 2 : blocks); ++i) {
+            const std::uint32_t second = table->paired ? i + blocks / 2 : i;
+            const double rounding = block_rounding(*table, i) + (second != i ? block_rounding(*table, second) : 0);
+            units.push_back({table, i, second, rounding, 4 * table->rows() * (second != i ? 2 : 1)});
             sum += units.back().error();
         }
     }
@@ -66,7 +66,7 @@ void set_bits(const std::vector<PackedTable*>& tables, double error, std::size_t
                 best = &unit;
         if (best == nullptr || !(best->gain() > 0)) return;
         sum -= best->gain(), bytes -= best->step;
-        best->table->bits[best->twin] = best->bits() += 4;
+        best->table->bits[best->second] = best->bits() += 4;
     }
 }
 

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -12,6 +13,8 @@
 
 #include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
+#include "sim2d/disc/single.hpp"
+#include "sim2d/slab/single.hpp"
 #include "tables/error.hpp"
 #include "tables/pack/spline.hpp"
 #include "tables/parallel.hpp"
@@ -21,15 +24,13 @@
 namespace medulla::tables {
 namespace {
 
-std::size_t side_of(TableKind kind) { return kind == TableKind::longitudinal_forward ? 1 : 0; }
-
-/// Lobes of a table between its nodes by the same splines that a pack uses.
+/// Lobes of a table, interpolated by the same splines as in a pack.
 class TableSource : public Source {
   public:
     explicit TableSource(Tables tables) : tables_(std::move(tables)) {
         for (const Table* table : tables_.present())
             for (const Axis& axis : parameters_of(*table))
-                splines_.emplace(table->name + axis.name, Spline::through(quantity_of(axis.name), axis.values));
+                splines_.emplace(table->name() + axis.name, Spline::through(quantity_of(axis.name), axis.values));
         if (tables_.azimuthal) lengths_ = survival_lengths(*tables_.azimuthal);
     }
 
@@ -41,10 +42,10 @@ class TableSource : public Source {
         const Table& table = *find(kind);
         const std::size_t own = table.bins();
         if (own % bins != 0 && bins % own != 0)
-            throw Error("{} bins asked of a table of {}: one must be a multiple of the other", bins, own);
+            throw Error("expected {} bins to divide or be a multiple of the table's {}", bins, own);
         std::vector<double> values(own, 0.0);
         for_nodes(table, at, [&](std::size_t cell, double weight) {
-            const float* from = table.lobe_of(cell + (table.name == "longitudinal" ? side_of(kind) : 0));
+            const float* from = table.lobe_of(cell + side_of(kind));
             for (std::size_t b = 0; b < own; ++b) values[b] += weight * static_cast<double>(from[b]);
         });
         std::vector<double> out(bins, 0.0);
@@ -61,7 +62,7 @@ class TableSource : public Source {
         const Table& table = *find(kind);
         double noise = 0;
         for_nodes(table, at, [&](std::size_t cell, double weight) {
-            noise += weight * table.standard_error[cell + (table.name == "longitudinal" ? side_of(kind) : 0)];
+            noise += weight * table.standard_error[cell + side_of(kind)];
         });
         return std::abs(noise);
     }
@@ -73,7 +74,7 @@ class TableSource : public Source {
             back += weight * table.energy[cell];
             total += weight * (table.energy[cell] + table.energy[cell + 1]);
         });
-        return total > 0 ? back / total : 0.5;  // nothing scattered: there is no share, and no energy to share
+        return total > 0 ? back / total : 0.5;  // no scattered energy: any share
     }
 
     double survival(const Parameters& at) const override {
@@ -91,18 +92,18 @@ class TableSource : public Source {
         return list;
     }
     const Table* find(TableKind kind) const {
-        const auto& table = kind == TableKind::azimuthal ? tables_.azimuthal : tables_.longitudinal;
+        const std::optional<Table>& table = tables_[table_of(kind)];
         return table ? &*table : nullptr;
     }
     /// Calls f(first cell of the node, weight) for every node with a weight; longitudinal nodes own two cells.
     template <class F>
     void for_nodes(const Table& table, const Parameters& at, F f) const {
-        std::vector<std::pair<std::size_t, double>> nodes = {{0, 1.0}};  // of the axes so far, and their weights
+        std::vector<std::pair<std::size_t, double>> nodes = {{0, 1.0}};  // cells of the axes so far, with weights
         for (const Axis& axis : parameters_of(table)) {
             Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(static_cast<Eigen::Index>(axis.size()));
             const double x = at[axis.name];
             const auto found = std::find(axis.values.begin(), axis.values.end(), x);
-            const Spline& spline = splines_.at(table.name + axis.name);
+            const Spline& spline = splines_.at(table.name() + axis.name);
             if (found != axis.values.end())
                 row[found - axis.values.begin()] = 1;
             else
@@ -115,7 +116,7 @@ class TableSource : public Source {
                 }
             nodes = std::move(next);
         }
-        for (const auto& [node, weight] : nodes) f(node * (table.name == "longitudinal" ? 2 : 1), weight);
+        for (const auto& [node, weight] : nodes) f(node * table.sides(), weight);
     }
 
     Tables tables_;
@@ -123,10 +124,10 @@ class TableSource : public Source {
     std::vector<double> lengths_;  ///< survival_lengths
 };
 
-/// Of a pack: as many nodes on an axis as a tables file may have, and lobes that a program can list.
+/// Limits of a pack: nodes of an axis as in a tables file, and lobes that a program can list.
 constexpr std::uint32_t most_nodes = 4096, most_lobes = 10000000;
 
-/// Lobes of a pack through the runtime's own contraction.
+/// Lobes of a pack, by the runtime's own contraction.
 class PackSource : public Source {
   public:
     PackSource(std::vector<unsigned char> bytes, const std::string& path) : bytes_(std::move(bytes)) {
@@ -184,7 +185,8 @@ class PackSource : public Source {
             const auto scale = static_cast<double>(contraction.inverse_integral);
             coefficients[0][j] = (part[0] + part[1]) * scale, coefficients[1][j] = (part[0] - part[1]) * scale;
         }
-        // What medulla::lobe returns, averaged: bins with an end of a dip below 0 are cut into sixteen.
+        // Averages of medulla::lobe: bins where the low-rank sum may become negative, and is clamped to 0, are split
+        // into sixteen.
         const std::vector<Point>&coarse = gauss_points(kind, bins, 1), &fine = gauss_points(kind, bins, 16);
         std::vector<double> out(bins, 0.0);
         const auto add = [&](std::size_t bin, const std::vector<Point>& points) {
@@ -197,12 +199,12 @@ class PackSource : public Source {
             }
         };
         for (std::size_t bin = 0; bin < bins; ++bin) {
-            bool dips = false;
+            bool undershoots = false;
             for (std::size_t i = 3 * bin; i < 3 * bin + 3; ++i) {
                 const double* c = &coefficients[coarse[i].negative ? 1 : 0][coarse[i].span];
-                dips = dips || std::min({c[0], c[1], c[2], c[3]}) < 0;
+                undershoots = undershoots || std::min({c[0], c[1], c[2], c[3]}) < 0;
             }
-            add(bin, dips ? fine : coarse);
+            add(bin, undershoots ? fine : coarse);
         }
         return out;
     }
@@ -223,7 +225,7 @@ class PackSource : public Source {
     }
 
   private:
-    /// Nodes are for information: nothing in the pack bounds them, but programs make one lobe of each.
+    /// The runtime does not use node counts, so open_pack does not bound them; programs evaluate one lobe per node.
     static void check_nodes(const TableView& table, const std::string& path) {
         double lobes = 1;
         for (std::uint32_t k = 0; k < table.layout.axis_count; ++k) {
@@ -249,7 +251,7 @@ class PackSource : public Source {
         q.theta_i = static_cast<float>(at.theta_i), q.absorption = static_cast<float>(at.absorption);
         return q;
     }
-    /// Three Gauss points per part of a bin: the basis there, worked out once per number of bins.
+    /// The spline basis at three Gauss points of each part of a bin, computed once per number of bins.
     const std::vector<Point>& gauss_points(TableKind kind, std::size_t bins, int parts) const {
         const std::lock_guard<std::mutex> lock(mutex_);
         std::vector<Point>& points = points_[{kind, bins, parts}];
@@ -301,20 +303,18 @@ double* Parameters::field(const std::string& axis) {
 }
 
 const char* name_of(TableKind kind) {
-    switch (kind) {
-        case TableKind::azimuthal:
-            return "azimuthal";
-        case TableKind::longitudinal_back:
-            return "longitudinal back";
-        case TableKind::longitudinal_forward:
-            return "longitudinal forward";
-        case TableKind::back_fraction:
-            return "longitudinal energies";
-        case TableKind::survival:
-            return "azimuthal survival";
-    }
-    return "?";
+    constexpr const char* names[] = {"azimuthal", "longitudinal back", "longitudinal forward", "longitudinal energies",
+                                     "azimuthal survival"};
+    static_assert(std::size(names) == table_kinds);
+    return names[static_cast<std::size_t>(kind)];
 }
+
+TableId table_of(TableKind kind) {
+    const bool disc = kind == TableKind::azimuthal || kind == TableKind::survival;
+    return disc ? TableId::azimuthal : TableId::longitudinal;
+}
+
+std::size_t side_of(TableKind kind) { return kind == TableKind::longitudinal_forward ? 1 : 0; }
 
 const char* exit_name(TableKind kind) { return kind == TableKind::azimuthal ? "phi" : "theta_r"; }
 
@@ -329,9 +329,9 @@ std::string Source::beyond(TableKind kind, const Parameters& at) const {
     if (!has(kind)) return "";
     for (const Axis& axis : parameter_axes(kind)) {
         const double x = at[axis.name], low = axis.values.front(), high = axis.values.back();
-        // Packs keep their axes in float: half a unit in its last place is no reason to refuse an end.
+        // A pack stores its axes as floats: the end of an axis is accepted within their rounding.
         const double slack = 1e-6 * std::max(std::abs(low), std::abs(high));
-        // As they are typed: angles in degrees.
+        // Messages have angles in degrees, as on the command line.
         const double unit = axis.name == "theta_i" ? pi / 180 : 1;
         if (!(x >= low - slack && x <= high + slack))
             return fmt::format("{} expected in [{:g}, {:g}]{}, found {:g}", axis.name, low / unit, high / unit,
@@ -347,8 +347,8 @@ bool Source::absorbs() const {
 }
 
 double energy_of(const Source& source, TableKind kind, const Parameters& at) {
-    if (kind == TableKind::azimuthal) return azimuthal_energy(at.sigma, at.h) * source.survival(at);
-    const double back = source.back_fraction(at), total = longitudinal_energy(at.sigma, at.theta_i);
+    if (kind == TableKind::azimuthal) return sim2d::disc_energy(at.sigma, at.h) * source.survival(at);
+    const double back = source.back_fraction(at), total = sim2d::slab_energy(at.sigma, at.theta_i);
     return total * (kind == TableKind::longitudinal_back ? back : 1 - back);
 }
 
@@ -364,11 +364,12 @@ std::unique_ptr<Source> open_source(const std::string& path) {
 }
 
 std::vector<unsigned char> read_pack(const std::string& path, bool or_tables) {
+    constexpr std::uint64_t greatest_pack = std::uint64_t{1} << 32;  // its offsets have 32 bits
     if (path == "default") {
         const auto* bytes = reinterpret_cast<const unsigned char*>(default_pack_words);
         return {bytes, bytes + default_pack_size};
     }
-    std::vector<unsigned char> bytes = read_file(path);
+    std::vector<unsigned char> bytes = read_file(path, greatest_pack);
     const OpenResult opened = open_pack(bytes.data(), bytes.size());
     if (opened.status != PackStatus::ok)
         throw Error("{}: expected a {}pack of version {}: {}", path, or_tables ? "tables file (HDF5) or a " : "",
@@ -404,7 +405,7 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
             const std::vector<double> a = reference.lobe(kind, at, bins);
             std::vector<double> b = candidate.lobe(kind, at, bins);
             noise[i] = reference.noise(kind, at);
-            if (shares && at.sigma > 0)  // else there is no energy to share
+            if (shares && at.sigma > 0)  // else there is no energy
                 back_share[i] = std::abs(candidate.back_fraction(at) - reference.back_fraction(at));
             const double width = (kind == TableKind::azimuthal ? 2 * pi : pi) / static_cast<double>(bins);
             double sum = 0, low = b[0];
@@ -425,7 +426,7 @@ std::vector<LobeError> compare(const Source& reference, const Source& candidate)
             total_misfit += misfit[i];
             total_noise += norm[i] * noise[i] * noise[i];
             error.worst_claim = std::max(error.worst_claim, std::sqrt(misfit[i] / norm[i] + noise[i] * noise[i]));
-            error.energy = std::isnan(energy[i]) ? energy[i] : std::max(error.energy, energy[i]);  // a NaN stays
+            error.energy = std::isnan(energy[i]) ? energy[i] : std::max(error.energy, energy[i]);  // NaN propagates
             error.least = std::min(error.least, least[i]);
             if (misfit[i] * norm[worst] > misfit[worst] * norm[i]) worst = i;
         }

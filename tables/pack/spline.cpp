@@ -14,7 +14,7 @@ Spline::Spline(const std::vector<double>& breakpoints) : spans_(static_cast<std:
     std::vector<double> exact = breakpoints;
     const double first = breakpoints.front(), last = breakpoints.back();
     for (std::ptrdiff_t i = 1; i <= 2; ++i) {
-        // Ghosts mirror the axis; a single span is mirrored about both its ends.
+        // Ghost knots mirror the axis; a single span is mirrored about both ends.
         const auto inner = static_cast<std::size_t>(std::min(i, n));
         const double below = breakpoints[static_cast<std::size_t>(n) - inner], above = breakpoints[inner];
         const double twice = i > n ? last - first : 0;
@@ -25,7 +25,7 @@ Spline::Spline(const std::vector<double>& breakpoints) : spans_(static_cast<std:
     for (const double x : exact) t.push_back(static_cast<double>(static_cast<float>(x)));
     for (std::size_t i = 0; i + 1 < t.size(); ++i)
         if (!(t[i] < t[i + 1]))
-            throw Error("spline: breakpoints {:g} and {:g} are one in float precision", t[i], t[i + 1]);
+            throw Error("spline: breakpoints {:g} and {:g} are equal in float precision", t[i], t[i + 1]);
     for (std::size_t i = 0; i < t.size(); ++i) {
         const auto inverse = [&](std::size_t step) { return i + step < t.size() ? 1 / (t[i + step] - t[i]) : 0.0; };
         knots_.push_back({t[i], inverse(1), inverse(2), inverse(3)});
@@ -52,7 +52,7 @@ Spline Spline::through(Quantity quantity, const std::vector<double>& nodes, Mirr
     };
     Eigen::MatrixXd system(size, size);
     for (Eigen::Index i = 0; i < n; ++i) system.row(i) = spline.basis(points[static_cast<std::size_t>(i)]);
-    if (n == 2) {  // a line: curvature 0 at both ends, and the two conditions make the cubic part vanish
+    if (n == 2) {  // a line: second and third derivative 0
         system.row(n) = differences(0, 2);
         system.row(n + 1) = differences(0, 3);
     } else if (n == 3) {  // one parabola

@@ -1,5 +1,5 @@
-// The cubic spline space of one pack axis, offline: fits that turn node values or bin averages into the coefficients
-// that medulla/axis.hpp evaluates. Knots are rounded to float first, so both sides use the same ones.
+// The cubic spline space of one pack axis, offline: fits node values or bin averages by the coefficients that
+// medulla/axis.hpp evaluates. Knots are rounded to float first, so that both use the same ones.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@
 
 namespace medulla::tables {
 
-/// How a function continues beyond 0: not at all, f(-x) = f(x), or f(-x) = -f(x).
+/// Symmetry of a function about 0: none, f(-x) = f(x), or f(-x) = -f(x).
 enum class Mirror { none, even, odd };
 
 class Spline {

@@ -8,7 +8,7 @@
 namespace medulla::tables {
 namespace {
 
-/// Bytes that grow; every part starts on a multiple of 4.
+/// A growing array of bytes; every appended array starts at a multiple of 4.
 class Blob {
   public:
     template <class T>
@@ -19,7 +19,7 @@ class Blob {
         if (count > 0) std::memcpy(bytes_.data() + offset, data, count * sizeof(T));
         return static_cast<std::uint32_t>(offset);
     }
-    /// The same for what tables share: the knots of equal axes are written once.
+    /// Appends knots, or finds equal ones: tables share the knots of equal axes.
     std::uint32_t append_knots(const std::vector<Knot<float>>& knots) {
         const std::size_t size = knots.size() * sizeof knots[0];
         for (const auto& [offset, length] : knots_)

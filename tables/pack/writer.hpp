@@ -1,4 +1,4 @@
-// Factors -> pack bytes: the writing half of medulla/pack.hpp.
+// Factors -> bytes of a pack, the counterpart of medulla/pack.hpp.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@ namespace medulla::tables {
 /// One axis of a low-rank table: the spline space and its coefficients, [spline.size() x rank].
 struct PackedAxis {
     Quantity quantity;
-    std::uint32_t nodes;  ///< of the table it was made from
+    std::uint32_t nodes;  ///< of the simulated table
     Spline spline;
     Eigen::MatrixXd coefficients;
 };
@@ -26,10 +26,10 @@ struct PackedTable {
     std::vector<PackedAxis> axes;  ///< the last one of a lobe is the exit direction
     Eigen::VectorXd weights;
     int even_rank;
-    float low, high;                       ///< least and greatest value of the table it was made from
+    float low, high;                       ///< smallest and largest value of the simulated table
     std::vector<std::uint32_t> bits = {};  ///< of each block: 4, 8, 12 or 16; empty: 16 all
-    bool twins = false;  ///< whether an even and an odd component share their factors of the parameter axes
-    /// Of each component: squared relative error of the table that rounding to units of its greatest coefficients adds.
+    bool paired = false;  ///< even and odd components come in pairs with equal factors of the parameter axes
+    /// Per component: squared relative error of the table from rounding to units of its largest coefficients.
     Eigen::VectorXd rounding = {};
 
     bool has_exit() const { return is_lobe(kind); }
@@ -45,10 +45,10 @@ struct PackedTable {
     std::size_t rows() const;
 };
 
-/// Greatest whole number that so many bits hold: a column's greatest coefficient, one scale making it that.
+/// Largest stored integer: the scale of a column maps its largest coefficient to it.
 inline int greatest_of(std::uint32_t bits) { return (1 << (bits - 1)) - 1; }
 
-/// Lays the tables out as a pack.
+/// Writes the tables as a pack.
 std::vector<unsigned char> write_pack(const std::vector<PackedTable>& tables, const std::string& provenance);
 
 }  // namespace medulla::tables

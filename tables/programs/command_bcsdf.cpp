@@ -4,6 +4,8 @@
 #include "medulla/medulla.hpp"
 #include "tables/job/material.hpp"
 #include "tables/programs/commands.hpp"
+#include "tables/programs/number.hpp"
+#include "tables/store/json_text.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -21,14 +23,12 @@ OffsetRange range_of(const BcsdfWords& words) {
         if (!(words.h >= -1 && words.h <= 1)) throw UsageError("--h: expected a value in [-1, 1], found {:g}", words.h);
         return {static_cast<float>(words.h), static_cast<float>(words.h)};
     }
-    const std::size_t colon = words.range.find(':');
-    char* end = nullptr;
-    const double low = std::strtod(words.range.c_str(), &end);
-    const bool low_ok = colon != std::string::npos && end == words.range.c_str() + colon && colon > 0;
-    const double high = low_ok ? std::strtod(words.range.c_str() + colon + 1, &end) : 0;
-    if (!low_ok || *end != 0 || !(-1 <= low && low <= high && high <= 1))
+    const std::size_t colon = std::min(words.range.find(':'), words.range.size() - 1);
+    const auto low = parse_number<double>(words.range.substr(0, colon)),
+               high = parse_number<double>(words.range.substr(colon + 1));
+    if (!low || !high || !(-1 <= *low && *low <= *high && *high <= 1))
         throw UsageError("--h-range: expected A:B with -1 <= A <= B <= 1, found '{}'", words.range);
-    return {static_cast<float>(low), static_cast<float>(high)};
+    return {static_cast<float>(*low), static_cast<float>(*high)};
 }
 
 /// One number for grey fur, three for coloured.
@@ -62,7 +62,6 @@ void run_bcsdf(const BcsdfWords& words) {
             throw UsageError("{}: expected degrees in {}, found {}", name, range, degrees);
     };
     check("--theta-i", words.theta_i, "(-90, 90)"), check("--theta-r", words.theta_r, "[-90, 90]");
-    if (!std::isfinite(words.phi)) throw UsageError("--phi: expected degrees, found {:g}", words.phi);
     const double phi = std::remainder(words.phi, 360.0);
     const OffsetRange range = range_of(words);
     Material material;
@@ -97,7 +96,7 @@ void run_bcsdf(const BcsdfWords& words) {
     nlohmann::ordered_json json;
     double sum[3] = {};
     if (!words.json)
-        fmt::print("{:<5} {:>12}  {:>12}  {:>12}\n", "lobe", "M [1/rad]", "N [1/rad]", "M N / cos^2 theta_i [1/rad^2]");
+        print("{:<5} {:>12}  {:>12}  {:>12}\n", "lobe", "M [1/rad]", "N [1/rad]", "M N / cos^2 theta_i [1/rad^2]");
     for (int lobe = 0; lobe < lobe_count; ++lobe) {
         double N[3], value[3];
         for (int c = 0; c < 3; ++c) {
@@ -108,14 +107,14 @@ void run_bcsdf(const BcsdfWords& words) {
         json["lobes"][lobe_names[lobe]] = {
             {"M", lobes.M[lobe]}, {"N", colour(N, material.grey)}, {"value", colour(value, material.grey)}};
         for (int c = 0; c < (material.grey ? 1 : 3) && !words.json; ++c)
-            fmt::print("{:<5} {:>12.6g}  {:>12.6g}  {:>12.6g}\n", c == 0 ? lobe_names[lobe] : "",
-                       static_cast<double>(lobes.M[lobe]), N[c], value[c]);
+            print("{:<5} {:>12.6g}  {:>12.6g}  {:>12.6g}\n", c == 0 ? lobe_names[lobe] : "",
+                  static_cast<double>(lobes.M[lobe]), N[c], value[c]);
     }
     json["sum"] = colour(sum, material.grey);
     if (words.json)
-        fmt::print("{}\n", json.dump());
+        print("{}\n", json_line(json));
     else
-        fmt::print("sum   {:.6g}\n", fmt::join(sum, sum + (material.grey ? 1 : 3), "  "));
+        print_text(fmt::format("sum   {:.6g}\n", fmt::join(sum, sum + (material.grey ? 1 : 3), "  ")));
 }
 
 struct PresetWords {
@@ -129,10 +128,10 @@ void run_presets(const PresetWords& words) {
     nlohmann::ordered_json json = nlohmann::ordered_json::array();
     constexpr const char* line = "{:<10} {:>6} {:>6} {:>6} {:>7} {:>7} {:>8} {:>8} {:>8} {:>5} {:>6}\n";
     if (!words.json) {
-        fmt::print(line, "name", "kappa", "eta", "alpha", "beta_m", "beta_n", "sigma_ca", "sigma_ms", "sigma_ma", "g",
-                   "layers");
+        print(line, "name", "kappa", "eta", "alpha", "beta_m", "beta_n", "sigma_ca", "sigma_ms", "sigma_ma", "g",
+              "layers");
         // Sigmas are per fibre radius.
-        fmt::print(line, "", "", "", "deg", "deg", "deg", "1/r", "1/r", "1/r", "", "");
+        print(line, "", "", "", "deg", "deg", "deg", "1/r", "1/r", "1/r", "", "");
     }
     for (const FurPreset& p : fur_presets) {
         json.push_back({{"name", p.name},
@@ -147,10 +146,10 @@ void run_presets(const PresetWords& words) {
                         {"g", as_printed(p.g)},
                         {"layers", as_printed(p.layers)}});
         if (!words.json)
-            fmt::print(line, p.name, p.kappa, p.eta, p.alpha, p.beta_m, p.beta_n, p.sigma_ca, p.sigma_ms, p.sigma_ma,
-                       p.g, p.layers);
+            print(line, p.name, p.kappa, p.eta, p.alpha, p.beta_m, p.beta_n, p.sigma_ca, p.sigma_ms, p.sigma_ma, p.g,
+                  p.layers);
     }
-    if (words.json) fmt::print("{}\n", nlohmann::ordered_json{{"presets", json}}.dump());
+    if (words.json) print("{}\n", json_line(nlohmann::ordered_json{{"presets", json}}));
 }
 
 }  // namespace
@@ -162,15 +161,14 @@ void add_bcsdf(CLI::App& app, Action& action) {
             auto* which = command.add_option_group("material")->require_option(1);
             which->add_option("--preset", words.preset, "animal of Table 4 (furtable presets)");
             which->add_option("--material", words.material, "JSON file of one material");
-            command.add_option("--theta-i", words.theta_i, "inclination of the light, degrees in (-90, 90)")
+            add_number(command, "--theta-i", words.theta_i, "inclination of the light, degrees in (-90, 90)")
                 ->required();
-            command.add_option("--theta-r", words.theta_r, "inclination of exit, degrees in [-90, 90]")->required();
-            command
-                .add_option("--phi", words.phi,
-                            "azimuth of exit less that of the light, degrees; 0 = back, whole turns count for nothing")
+            add_number(command, "--theta-r", words.theta_r, "inclination of exit, degrees in [-90, 90]")->required();
+            add_number(command, "--phi", words.phi,
+                       "azimuth of exit less that of the light, degrees; 0 = back, whole turns count for nothing")
                 ->required();
             auto* where = command.add_option_group("offset")->require_option(1);
-            words.h_given = where->add_option("--h", words.h, "near field: one offset in [-1, 1]");
+            words.h_given = add_number(*where, "--h", words.h, "near field: one offset in [-1, 1]");
             where->add_option("--h-range", words.range, "mean over offsets A:B");
             where->add_flag("--far", words.far, "far field: mean over -1:1");
             command

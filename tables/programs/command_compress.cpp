@@ -3,7 +3,9 @@
 
 #include "tables/pack/compress.hpp"
 #include "tables/programs/commands.hpp"
-#include "tables/store/file.hpp"
+#include "tables/programs/number.hpp"
+#include "tables/store/json_text.hpp"
+#include "tables/store/output.hpp"
 #include "tables/store/tables_file.hpp"
 
 namespace medulla::tables {
@@ -16,8 +18,8 @@ struct CompressWords {
     std::vector<std::string> files;
     std::string output, solver = "lm";
     std::optional<int> rank;
-    double max_error = 0;
-    std::size_t max_bytes = 0;
+    std::optional<double> max_error;
+    std::optional<std::size_t> max_bytes;
     std::uint64_t seed = 1;
     bool nonnegative = false, json = false;
     std::optional<int> sweeps;
@@ -52,13 +54,11 @@ Tables read_all(const std::vector<std::string>& files) {
     Tables all = read_tables(files[0]);
     for (std::size_t i = 1; i < files.size(); ++i) {
         Tables more = read_tables(files[i]);
-        for (const auto& [mine, other] :
-             {std::pair(&all.azimuthal, &more.azimuthal), std::pair(&all.longitudinal, &more.longitudinal)}) {
-            if (!*other) continue;
-            if (*mine)
-                throw Error("{}: expected another table than {}, found /{} in both", files[i], files[0],
-                            (*other)->name);
-            *mine = std::move(*other);
+        for (const TableId id : table_ids) {
+            if (!more[id]) continue;
+            if (all[id])
+                throw Error("{}: expected another table than {}, found /{} in both", files[i], files[0], name_of(id));
+            all[id] = std::move(more[id]);
         }
     }
     return all;
@@ -68,21 +68,23 @@ std::string file_name(const std::string& path) { return path.substr(path.rfind('
 
 void run_compress(const CompressWords& words) {
     const std::string& first = words.files[0];
-    const std::string output = words.output.empty() ? first.substr(0, first.rfind(".h5")) + ".furpack" : words.output;
+    const bool named = first.size() > 3 && first.compare(first.size() - 3, 3, ".h5") == 0;
+    const std::string stem = named ? first.substr(0, first.size() - 3) : first;
+    const Output output(words.output.empty() ? stem + ".furpack" : words.output, words.files);
+    if (!words.json) print_messages();
     CompressOptions options;
     if (words.rank) options.rank = *words.rank;
     options.seed = words.seed;
     options.max_sweeps = words.sweeps;
     options.solver = words.solver == "als" ? tensor::Solver::als : tensor::Solver::lm;
     if (words.nonnegative) options.solver = tensor::Solver::nonnegative;
-    if (words.max_error > 0) options.max_error = words.max_error;
-    if (words.max_bytes > 0) options.max_bytes = words.max_bytes;
+    options.max_error = words.max_error;
+    options.max_bytes = words.max_bytes;
     std::string input;
-    for (const std::string& file : words.files) input += (input.empty() ? "" : ", ") + file_name(file);
-    refuse_input(output, words.files);
+    for (const std::string& file : words.files) input += (input.empty() ? "" : ", ") + json_name(file_name(file));
     const Tables tables = read_all(words.files);
     const CompressResult result = compress(tables, options, input);
-    write_file(output, result.pack.data(), result.pack.size());
+    output.write(result.pack.data(), result.pack.size());
     // Who asked for no size is told what the default pack's would give.
     const bool unsized = !words.rank && !options.max_error && !options.max_bytes;
     const auto larger = [&] {
@@ -90,7 +92,7 @@ void run_compress(const CompressWords& words) {
         return compress(tables, options, input);
     };
     if (words.json) {
-        nlohmann::ordered_json json = {{"output", output},
+        nlohmann::ordered_json json = {{"output", json_name(output.path())},
                                        {"bytes", result.pack.size()},
                                        {"seconds", result.solve_seconds},
                                        {"cpu_seconds", result.cpu_seconds}};
@@ -102,31 +104,31 @@ void run_compress(const CompressWords& words) {
             const CompressResult more = larger();
             json["max_bytes_153600"] = {{"bytes", more.pack.size()}, {"errors", to_json(more.errors)}};
         }
-        fmt::print("{}\n", json.dump());
+        print("{}\n", json_line(json));
         return;
     }
     for (const TableReport& report : result.tables) {
-        fmt::print("{}: {} {:.3e} relative L2 (exit spline {:.1e}), rounding {:.1e}, noise of the table {:.1e}\n",
-                   medulla::tables::name_of(report.kind), is_nonnegative(report) ? "in the pack" : "factors",
-                   report.fit_error, report.exit_error, report.rounding, report.noise);
+        print("{}: {} {:.3e} relative L2 (exit spline {:.1e}), rounding {:.1e}, noise of the table {:.1e}\n",
+              medulla::tables::name_of(report.kind), is_nonnegative(report) ? "in the pack" : "factors",
+              report.fit_error, report.exit_error, report.rounding, report.noise);
         for (const PartReport& part : report.parts)
-            fmt::print("  {:<8} rank {:>3}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
-                       mirror_name(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
-                       tensor::to_string(part.solve.stop), part.solve.seconds, part.solve.degeneracy.least_cosine,
-                       part.solve.degeneracy.norm_ratio);
+            print("  {:<8} rank {:>3}, {} {} iterations ({}), {:.2f} s; least cosine {:.3f}, norm ratio {:.1f}\n",
+                  mirror_name(part.mirror), part.rank, part.solve.solver, part.solve.iterations,
+                  tensor::to_string(part.solve.stop), part.solve.seconds, part.solve.degeneracy.least_cosine,
+                  part.solve.degeneracy.norm_ratio);
     }
     print(result.errors);
     print(result.degeneracy);
-    fmt::print("{}: {} bytes in {:.2f} s ({:.2f} s of processor time)\n", output, result.pack.size(),
-               result.solve_seconds, result.cpu_seconds);
+    print("{}: {} bytes in {:.2f} s ({:.2f} s of processor time)\n", output.path(), result.pack.size(),
+          result.solve_seconds, result.cpu_seconds);
     if (!unsized) return;
-    fmt::print("for comparison, solving for --max-bytes {} (give a size, --rank 16 say, to leave it out) ..\n",
-               default_bytes);
-    std::fflush(stdout);
+    print("for comparison, solving for --max-bytes {} (give a size, --rank 16 say, to leave it out) ..\n",
+          default_bytes);
+    flush_output();
     std::string errors;
     for (const LobeError& error : larger().errors)
         errors += fmt::format("{}{} {:.1e}", errors.empty() ? "" : ", ", name_of(error.kind), error.relative);
-    fmt::print("with --max-bytes {}: {}\n", default_bytes, errors);
+    print("with --max-bytes {}: {}\n", default_bytes, errors);
 }
 
 struct DiffWords {
@@ -162,7 +164,7 @@ void run_diff(const DiffWords& words) {
     if (words.json) {
         nlohmann::ordered_json json = {{"errors", to_json(errors)}};
         if (!degeneracy.empty()) json["degeneracy"] = to_json(degeneracy);
-        fmt::print("{}\n", json.dump());
+        print("{}\n", json_line(json));
         return;
     }
     print(errors);
@@ -193,28 +195,28 @@ nlohmann::ordered_json to_json(const PackDegeneracy& degeneracy) {
 }
 
 void print(const std::vector<LobeError>& errors) {
-    fmt::print("{:<22} {:>12} {:>12} {:>14}  {}\n", "lobes", "relative L2", "worst lobe", "energy error", "worst at");
+    print("{:<22} {:>12} {:>12} {:>14}  {}\n", "lobes", "relative L2", "worst lobe", "energy error", "worst at");
     for (const LobeError& error : errors)
-        fmt::print("{:<22} {:>12.3e} {:>12.3e} {:>14.1e}  {}\n", name_of(error.kind), error.relative, error.worst,
-                   error.energy, error.worst_at);
+        print("{:<22} {:>12.3e} {:>12.3e} {:>14.1e}  {}\n", name_of(error.kind), error.relative, error.worst,
+              error.energy, error.worst_at);
     for (const LobeError& error : errors)
         if (error.survival)
-            fmt::print("{}: greatest error of the share that absorption leaves {:.1e}\n", name_of(error.kind),
-                       *error.survival);
+            print("{}: greatest error of the share that absorption leaves {:.1e}\n", name_of(error.kind),
+                  *error.survival);
     for (const LobeError& error : errors)
         if (error.noise > 0)
-            fmt::print("{}: the reference's noise is {:.1e}; with it {:.3e}, worst lobe {:.3e}{}\n",
-                       name_of(error.kind), error.noise, error.claim, error.worst_claim,
-                       error.relative < error.noise ? ": no error below the noise is known" : "");
+            print("{}: the reference's noise is {:.1e}; with it {:.3e}, worst lobe {:.3e}{}\n", name_of(error.kind),
+                  error.noise, error.claim, error.worst_claim,
+                  error.relative < error.noise ? ": no error below the noise is known" : "");
     for (const LobeError& error : errors)
         if (error.kind == TableKind::longitudinal_back)
-            fmt::print("share of energy that leaves backward: off by at most {:.1e}\n", error.back_share);
+            print("share of energy that leaves backward: off by at most {:.1e}\n", error.back_share);
 }
 
 void print(const PackDegeneracy& degeneracy) {
     for (const auto& [kind, d] : degeneracy)
-        fmt::print("{}: component norms add up to {:.1f} times the table's, least cosine {:.3f}\n", name_of(kind),
-                   d.norm_ratio, d.least_cosine);
+        print("{}: component norms add up to {:.1f} times the table's, least cosine {:.3f}\n", name_of(kind),
+              d.norm_ratio, d.least_cosine);
 }
 
 void add_compress(CLI::App& app, Action& action) {
@@ -226,15 +228,14 @@ void add_compress(CLI::App& app, Action& action) {
                 ->expected(1, 2);
             command.add_option("-o,--output", words.output, "pack to write (default: FILE with .furpack)");
             auto* size = command.add_option_group("size")->require_option(0, 1);
-            size->add_option("--rank", words.rank,
-                             "components of each part: lobes have a mirror-even and an odd one (default 16). A pack "
-                             "stores them padded with zeros to a multiple of 8, so that 4 take the bytes of 8")
-                ->check(CLI::Range(1, static_cast<int>(max_rank / 2)));
-            size->add_option("--max-error", words.max_error,
-                             "smallest pack that keeps this relative L2, rounding included")
-                ->check(CLI::PositiveNumber);
-            size->add_option("--max-bytes", words.max_bytes, "least error within this many bytes")
-                ->check(CLI::PositiveNumber);
+            add_number(*size, "--rank", words.rank,
+                       "components of each part: lobes have a mirror-even and an odd one (default 16). A pack "
+                       "stores them padded with zeros to a multiple of 8, so that 4 take the bytes of 8",
+                       {1, static_cast<int>(max_rank / 2)});
+            add_number(*size, "--max-error", words.max_error,
+                       "smallest pack that keeps this relative L2, rounding included", above_zero);
+            add_number(*size, "--max-bytes", words.max_bytes, "least error within this many bytes",
+                       {1, std::numeric_limits<std::size_t>::max()});
             command.add_option("--solver", words.solver, "alternating least squares or Levenberg-Marquardt")
                 ->check(CLI::IsMember({"als", "lm"}))
                 ->capture_default_str();
@@ -242,11 +243,10 @@ void add_compress(CLI::App& app, Action& action) {
                 .add_flag("--nonnegative", words.nonnegative,
                           "factors >= 0: each component is a density; by coordinate descent")
                 ->excludes("--solver");
-            command.add_option("--seed", words.seed, "of the solver's start")->capture_default_str();
-            command
-                .add_option("--sweeps", words.sweeps,
-                            "most steps of a solve (default: of lm 100, of als 500); more leave a little less error")
-                ->check(CLI::Range(1, 100000));
+            add_number(command, "--seed", words.seed, "of the solver's start")->capture_default_str();
+            add_number(command, "--sweeps", words.sweeps,
+                       "most steps of a solve (default: of lm 100, of als 500); more leave a little less error",
+                       {1, 100000});
             command.add_flag("--json", words.json, "print one JSON object");
         },
         run_compress);

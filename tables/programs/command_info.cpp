@@ -6,6 +6,7 @@
 
 #include "medulla/lookup.hpp"
 #include "tables/programs/commands.hpp"
+#include "tables/programs/number.hpp"
 #include "tables/store/json_text.hpp"
 #include "tables/store/slices.hpp"
 #include "tables/store/tables_file.hpp"
@@ -30,7 +31,7 @@ nlohmann::ordered_json axis_json(const Axis& axis) {
 }
 
 nlohmann::ordered_json info(const std::string& path) {
-    nlohmann::ordered_json json = {{"file", path}};
+    nlohmann::ordered_json json = {{"file", json_name(path)}};
     if (is_tables(path)) {
         const Tables tables = read_tables(path);
         json["kind"] = "tables";
@@ -38,7 +39,7 @@ nlohmann::ordered_json info(const std::string& path) {
         json["sha256"] = hex(contents_hash(tables));
         json["configuration"] = hex(configuration_hash(tables));
         for (const Table* table : tables.present()) {
-            nlohmann::ordered_json& out = json["tables"][table->name];
+            nlohmann::ordered_json& out = json["tables"][table->name()];
             out["method"] = table->method;
             out["seed"] = table->seed;
             out["paths"] = table->paths;
@@ -77,14 +78,14 @@ nlohmann::ordered_json info(const std::string& path) {
 void print_axes(const nlohmann::ordered_json& axes) {
     for (const auto& axis : axes) {
         const std::vector<double> values = axis["values"];
-        fmt::print("    {:<10} {:>11}, {:.6g} .. {:.6g} [{}]\n", axis["name"].get<std::string>(),
-                   counted(values.size(), "node"), values.front(), values.back(), axis["unit"].get<std::string>());
+        print("    {:<10} {:>11}, {:.6g} .. {:.6g} [{}]\n", axis["name"].get<std::string>(),
+              counted(values.size(), "node"), values.front(), values.back(), axis["unit"].get<std::string>());
     }
 }
 
 /// `auto` solves without paths where its grids reach what so many paths would.
 std::string how_solved(const nlohmann::ordered_json& table) {
-    const auto method = table["method"].get<std::string>();
+    const std::string method = one_line(table["method"].get<std::string>());
     const auto paths = table["paths"].get<std::uint64_t>();
     std::string text = fmt::format("method {}", method);
     if (method == "auto" && paths > 0)
@@ -99,30 +100,28 @@ void run_info(const InfoWords& words) {
     for (const std::string& file : words.files) {
         const nlohmann::ordered_json json = info(file);
         if (words.json) {
-            fmt::print("{}\n", json.dump());
+            print("{}\n", json_line(json));
             continue;
         }
         const bool tables = json["kind"] == "tables";
-        fmt::print("{}: {}\n", file,
-                   tables
-                       ? fmt::format("tables, written by {}", json["program"].get<std::string>())
-                       : fmt::format("pack of version {}, {} bytes", pack_version, json["bytes"].get<std::size_t>()));
+        print("{}: {}\n", file,
+              tables ? fmt::format("tables, written by {}", one_line(json["program"].get<std::string>()))
+                     : fmt::format("pack of version {}, {} bytes", pack_version, json["bytes"].get<std::size_t>()));
         for (const auto& [name, table] : json["tables"].items()) {
             if (tables)
-                fmt::print("  {}: {}\n    standard error of a lobe: median {:.2e}, worst {:.2e}\n", name,
-                           how_solved(table), table["standard_error"]["median"].get<double>(),
-                           table["standard_error"]["worst"].get<double>());
+                print("  {}: {}\n    standard error of a lobe: median {:.2e}, worst {:.2e}\n", name, how_solved(table),
+                      table["standard_error"]["median"].get<double>(), table["standard_error"]["worst"].get<double>());
             else
-                fmt::print("  {}: rank {}\n", name, table["rank"].get<int>());
+                print("  {}: rank {}\n", name, table["rank"].get<int>());
             for (const char* goal : {"target_error", "time_budget"})
-                if (table.contains(goal)) fmt::print("    {} {:g}\n", goal, table[goal].get<double>());
+                if (table.contains(goal)) print("    {} {:g}\n", goal, table[goal].get<double>());
             print_axes(table["axes"]);
             if (table.contains("exit"))
-                fmt::print("    {:<10} {:>5} bins as {} spline spans\n", table["exit"]["name"].get<std::string>(),
-                           table["exit"]["bins"].get<std::size_t>(), table["exit"]["spans"].get<int>());
+                print("    {:<10} {:>5} bins as {} spline spans\n", table["exit"]["name"].get<std::string>(),
+                      table["exit"]["bins"].get<std::size_t>(), table["exit"]["spans"].get<int>());
         }
-        if (tables) fmt::print("  SHA-256 of the contents: {}\n", json["sha256"].get<std::string>());
-        if (!tables) fmt::print("  provenance: {}\n", json["provenance"].dump());
+        if (tables) print("  SHA-256 of the contents: {}\n", json["sha256"].get<std::string>());
+        if (!tables) print("  provenance: {}\n", json_line(json["provenance"]));
     }
 }
 
@@ -146,7 +145,7 @@ double asymmetry(const std::vector<double>& lobe) {
 
 /// What a table promises beyond what reading it checks: mirror-symmetric lobes where the light is head-on.
 void verify_table(const Table& table, const std::string& path) {
-    const char* offset = table.name == "longitudinal" ? "theta_i" : "h";
+    const char* offset = table.id == TableId::longitudinal ? "theta_i" : "h";
     for (std::size_t cell = 0; cell < table.cells(); ++cell) {
         if (table.parameter(cell, offset) != 0) continue;
         const double noise = table.standard_error[cell];
@@ -154,7 +153,7 @@ void verify_table(const Table& table, const std::string& path) {
         if (found > 5 * std::sqrt(2.0) * noise + 1e-6)
             throw Error(
                 "{}: /{}: {}: expected a mirror-symmetric lobe, found asymmetry {:.2e} at standard error {:.2e}", path,
-                table.name, table.describe(cell), found, noise);
+                table.name(), table.describe(cell), found, noise);
     }
 }
 
@@ -286,24 +285,25 @@ void run_verify(const VerifyWords& words) {
             say("furtable", *error);
         }
         const nlohmann::ordered_json degeneracy = to_json(found.degeneracy);
-        json[file] = {{"ok", !error},
-                      {"error", or_null(error)},
-                      {"cells", or_null(found.cells)},
-                      {"energy_error", or_null(found.energy_error)},
-                      {"dip", or_null(found.dip)},
-                      {"degeneracy", degeneracy}};
+        json[json_name(file)] = {
+            {"ok", !error},
+            {"error", error ? nlohmann::ordered_json(json_name(*error)) : nlohmann::ordered_json(nullptr)},
+            {"cells", or_null(found.cells)},
+            {"energy_error", or_null(found.energy_error)},
+            {"dip", or_null(found.dip)},
+            {"degeneracy", degeneracy}};
         if (words.json || error) continue;
         if (found.cells)
-            fmt::print("{}: ok: SHA-256, {} finite and >= 0, integrals, energies and symmetry as they must be\n", file,
-                       counted(*found.cells, "cell"));
+            print("{}: ok: SHA-256, {} finite and >= 0, integrals, energies and symmetry as they must be\n", file,
+                  counted(*found.cells, "cell"));
         else
-            fmt::print(
+            print(
                 "{}: ok: checksum, structure, lobes >= 0 of integral 1 within {:.1e}; dips hold at most {:.1e} of "
                 "{:g}\n",
                 file, *found.energy_error, *found.dip, words.most_dip);
         print(found.degeneracy);
     }
-    if (words.json) fmt::print("{}\n", json.dump());
+    if (words.json) print("{}\n", json_line(json));
     if (!all_good) throw Reported();
 }
 
@@ -327,12 +327,10 @@ void add_verify(CLI::App& app, Action& action) {
         [](CLI::App& command, VerifyWords& words) {
             command.add_option("FILE", words.files, "tables files and packs; all are checked, also after a bad one")
                 ->required();
-            command
-                .add_option(
-                    "--max-dip", words.most_dip,
-                    "how much of a pack's signed lobe may lie below 0, where it is held at 0. The default tells "
-                    "densities from nonsense; `diff` says how accurate a pack is")
-                ->check(CLI::NonNegativeNumber)
+            add_number(command, "--max-dip", words.most_dip,
+                       "how much of a pack's signed lobe may lie below 0, where it is held at 0. The default tells "
+                       "densities from nonsense; `diff` says how accurate a pack is",
+                       {0, std::numeric_limits<double>::max()})
                 ->capture_default_str();
             command.add_flag("--json", words.json, "print one JSON object: an entry with the same keys for every file");
         },

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include "tables/programs/commands.hpp"
+#include "tables/store/json_text.hpp"
 #include "tables/store/merge.hpp"
 #include "tables/store/slices.hpp"
 #include "tables/store/tables_file.hpp"
@@ -16,15 +17,17 @@ struct MergeWords {
 };
 
 void run_merge(const MergeWords& words) {
+    const Output output(words.output, words.parts);
+    if (!words.json) print_messages();
     const Tables tables = merge(words.parts);
-    write_tables(words.output, tables, Compression::zstd);
+    write_tables(output, tables, Compression::zstd);
     const std::string hash = hex(contents_hash(tables));
     const std::size_t slices = slices_of(tables).size();
     if (words.json)
-        fmt::print("{}\n",
-                   nlohmann::ordered_json{{"output", words.output}, {"slices", slices}, {"sha256", hash}}.dump());
+        print("{}\n", json_line(nlohmann::ordered_json{
+                          {"output", json_name(words.output)}, {"slices", slices}, {"sha256", hash}}));
     else
-        fmt::print("{}: {}, SHA-256 of the contents {}\n", words.output, counted(slices, "slice"), hash);
+        print("{}: {}, SHA-256 of the contents {}\n", words.output, counted(slices, "slice"), hash);
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 #include <fmt/core.h>
 
 #include "tables/programs/commands.hpp"
+#include "tables/programs/number.hpp"
+#include "tables/store/json_text.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -23,8 +25,8 @@ struct Column {
 void print_columns(const std::vector<Column>& columns, const char* separator) {
     for (std::size_t row = 0; row < columns[0].values.size(); ++row) {
         for (std::size_t c = 0; c < columns.size(); ++c)
-            fmt::print("{}{:.9g}", c == 0 ? "" : separator, columns[c].values[row]);
-        fmt::print("\n");
+            print("{}{:.9g}", c == 0 ? "" : separator, columns[c].values[row]);
+        print("\n");
     }
 }
 
@@ -64,14 +66,14 @@ void run_query(const QueryWords& words) {
     }
     if (words.json) {
         for (const Column& column : columns) json[column.name] = column.values;
-        fmt::print("{}\n", json.dump());
+        print("{}\n", json_line(json));
         return;
     }
     std::string names;
     for (const Column& column : columns) names += (names.empty() ? "" : (words.csv ? "," : " ")) + column.name;
     if (!words.csv)
-        for (const auto& [key, value] : json.items()) fmt::print("# {} {}\n", key, value.dump());
-    fmt::print("{}{}\n", words.csv ? "" : "# ", names);
+        for (const auto& [key, value] : json.items()) print("# {} {}\n", key, json_line(value));
+    print("{}{}\n", words.csv ? "" : "# ", names);
     print_columns(columns, words.csv ? "," : " ");
 }
 
@@ -85,14 +87,14 @@ void add_query(CLI::App& app, Action& action) {
             command.add_option("--table", words.table, "which table")
                 ->required()
                 ->check(CLI::IsMember({"azimuthal", "longitudinal"}));
-            command.add_option("--sigma", words.at.sigma, "optical radius of scattering")->required();
-            command.add_option("--g", words.at.g, "mean cosine")->required();
-            words.h = command.add_option("--h", words.at.h, "offset in [-1, 1] (azimuthal)");
-            words.theta = command.add_option("--theta", words.theta_degrees, "inclination in degrees (longitudinal)");
-            words.absorption = command.add_option("--absorption", words.at.absorption,
-                                                  "optical radius of absorption, where there is such an axis");
-            command.add_option("--bins", words.bins, "exit directions to print (default: the table's own)")
-                ->check(CLI::Range(2, 100000));
+            add_number(command, "--sigma", words.at.sigma, "optical radius of scattering")->required();
+            add_number(command, "--g", words.at.g, "mean cosine")->required();
+            words.h = add_number(command, "--h", words.at.h, "offset in [-1, 1] (azimuthal)");
+            words.theta = add_number(command, "--theta", words.theta_degrees, "inclination in degrees (longitudinal)");
+            words.absorption = add_number(command, "--absorption", words.at.absorption,
+                                          "optical radius of absorption, where there is such an axis");
+            add_number(command, "--bins", words.bins, "exit directions to print (default: the table's own)",
+                       {2, 100000});
             auto* csv = command.add_flag("--csv", words.csv, "comma-separated with one header line");
             command.add_flag("--json", words.json, "print one JSON object")->excludes(csv);
         },

@@ -5,10 +5,13 @@
 
 #include "sim2d/disc/deterministic.hpp"
 #include "tables/job/forecast.hpp"
+#include "tables/job/launcher.hpp"
 #include "tables/job/precompute.hpp"
 #include "tables/job/scene.hpp"
 #include "tables/job/simulate.hpp"
+#include "tables/programs/number.hpp"
 #include "tables/programs/program.hpp"
+#include "tables/store/json_text.hpp"
 
 namespace {
 
@@ -55,9 +58,6 @@ Request request_of(const Words& words) {
         set(request.absorption, words.absorption, "--absorption-range");  // default: none
         request.bins = words.bins;
         request.paths = words.paths;
-        if (words.target_error && *words.target_error == 0)
-            throw Error("--target-error: expected more than 0, found 0");
-        if (words.time_budget && *words.time_budget == 0) throw Error("--time-budget: expected more than 0, found 0");
         request.target_error = words.target_error.value_or(0);
         request.time_budget = words.time_budget.value_or(0);
         request.seed = words.seed;
@@ -81,14 +81,18 @@ Compression compression_of(const std::string& name) {
     return name == "gzip" ? Compression::gzip : Compression::zstd;
 }
 
-/// What --shard says; `auto` asks the launcher's environment.
-std::optional<Shard> shard_of(const std::string& words) {
+/// What --shard says; `auto` asks the launcher's environment, and says what it found.
+std::optional<WorkerShare> share_named(const std::string& words) {
     try {
-        if (words == "auto") return launcher_shard([](const char* name) { return std::getenv(name); });
         if (words == "none") return std::nullopt;
-        return parse_shard(words);
+        if (words != "auto") return parse_worker_share(words);
+        const std::optional<Launched> found = launched([](const char* name) { return std::getenv(name); });
+        if (!found) return std::nullopt;
+        note("medulla-precompute: worker {} of {} by {} (--shard none: alone)\n", found->share.index,
+             found->share.count, found->from);
+        return found->share;
     } catch (const Error& error) {
-        throw UsageError("{}", error.what());
+        throw UsageError("{}{}", words == "auto" ? "--shard auto: " : "", error.what());
     }
 }
 
@@ -96,8 +100,9 @@ Job job_of(const Words& words) {
     Job job;
     job.request = request_of(words);
     job.output = words.output;
+    if (!words.scene.empty()) job.inputs = {words.scene};
     job.resume = words.resume;
-    job.shard = shard_of(words.shard);
+    job.share = share_named(words.shard);
     job.progress = progress_of(words.progress);
     job.compression = compression_of(words.compression);
     return job;
@@ -106,7 +111,7 @@ Job job_of(const Words& words) {
 /// The slices of a job, or of a worker's share.
 std::vector<SliceId> slices_of_job(const Job& job) {
     const std::vector<SliceId> all = slices_of(plan_of(job.request));
-    return job.shard ? share_of(job.request, all, *job.shard) : all;
+    return job.share ? share_of(job.request, all, *job.share) : all;
 }
 
 double total_cost(const Job& job) {
@@ -127,37 +132,40 @@ void print_forecast(const Job& job, double share, bool as_json) {
                                    {"measured_slices", expected.measured},
                                    {"share_of_whole", share}};
     for (const Table* table : plan.present()) {
-        if (!as_json) fmt::print("{}: {} x {} bins\n", table->name, counted(table->cells(), "cell"), table->bins());
+        if (!as_json) print("{}: {} x {} bins\n", table->name(), counted(table->cells(), "cell"), table->bins());
         for (std::size_t k = 0; k + 1 < table->axes.size(); ++k) {
             const Axis& axis = table->axes[k];
-            json["tables"][table->name][axis.name] = axis.values;
+            json["tables"][table->name()][axis.name] = axis.values;
             if (!as_json)
-                fmt::print("    {:<10} {:>11}, {:.6g} .. {:.6g} [{}]\n", axis.name, counted(axis.size(), "node"),
-                           axis.values.front(), axis.values.back(), axis_rule(axis.name).unit);
+                print("    {:<10} {:>11}, {:.6g} .. {:.6g} [{}]\n", axis.name, counted(axis.size(), "node"),
+                      axis.values.front(), axis.values.back(), axis_rule(axis.name).unit);
         }
     }
     if (as_json) {
-        fmt::print("{}\n", json.dump());
+        print("{}\n", json_line(json));
         return;
     }
-    if (share < 1) fmt::print("{:.2g} % of the cost of all nodes\n", 100 * share);
-    fmt::print("{}, {}: about {} ({} of one core, as {} of the slices took)\n", counted(expected.slices, "slice"),
-               counted(expected.cells, "cell"), duration_text(expected.seconds), duration_text(expected.core_seconds),
-               expected.measured);
+    if (share < 1) print("{:.2g} % of the cost of all nodes\n", 100 * share);
+    print("{}, {}: about {} ({} of one core, as {} of the slices took)\n", counted(expected.slices, "slice"),
+          counted(expected.cells, "cell"), duration_text(expected.seconds), duration_text(expected.core_seconds),
+          expected.measured);
 }
 
 /// A worker's last words: what it did, and what is to be done when all have.
 void print_share(const Job& job, const JobReport& report, double seconds, bool as_json) {
     if (as_json) {
-        const nlohmann::ordered_json json = {{"shards", report.shards},    {"shard", job.shard->index},
-                                             {"of", job.shard->count},     {"slices", report.slices},
-                                             {"kept_before", report.kept}, {"seconds", seconds}};
-        fmt::print("{}\n", json.dump());
+        const nlohmann::ordered_json json = {{"shards", json_name(report.folder)},
+                                             {"shard", job.share->index},
+                                             {"of", job.share->count},
+                                             {"slices", report.slices},
+                                             {"kept_before", report.kept},
+                                             {"seconds", seconds}};
+        print("{}\n", json_line(json));
         return;
     }
-    fmt::print("shard {}/{}: {} in {} after {}; when every shard is there: furtable merge {} -o {}\n", job.shard->index,
-               job.shard->count, counted(report.slices, "slice"), report.shards, duration_text(seconds), report.shards,
-               job.output);
+    print("shard {}/{}: {} in {} after {}; when every shard is there: furtable merge {} -o {}\n", job.share->index,
+          job.share->count, counted(report.slices, "slice"), report.folder, duration_text(seconds), report.folder,
+          job.output);
 }
 
 void run(const Words& words) {
@@ -172,15 +180,16 @@ void run(const Words& words) {
             const std::string what = error.what();
             throw Error("{}{}", what.rfind(words.scene, 0) == 0 ? "" : words.scene + ": ", what);
         }
-        for (const std::string& note : notes) fmt::print(stderr, "{}: {}\n", words.scene, note);
+        for (const std::string& text : notes) note("{}: {}\n", words.scene, text);
         share = total_cost(job) / whole;
     }
     if (words.dry_run) return print_forecast(job, share, words.json);
+    if (!words.json) print_messages();
     const auto start = std::chrono::steady_clock::now();
     const JobReport report = run_job(job);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    if (job.shard && !report.was_complete) return print_share(job, report, seconds, words.json);
-    nlohmann::ordered_json json = {{"output", words.output},
+    if (job.share && !report.was_complete) return print_share(job, report, seconds, words.json);
+    nlohmann::ordered_json json = {{"output", json_name(words.output)},
                                    {"seconds", seconds},
                                    {"was_complete", report.was_complete},
                                    {"sha256", hex(contents_hash(report.tables))}};
@@ -189,24 +198,24 @@ void run(const Words& words) {
         std::size_t above = 0;  // cells that did not reach --target-error
         for (const double e : table->standard_error) worst = std::max(worst, e), above += e > job.request.target_error;
         if (job.request.target_error == 0) above = 0;
-        json["tables"][table->name] = {{"cells", table->cells()},
-                                       {"bins", table->bins()},
-                                       {"method", table->method},
-                                       {"worst_standard_error", worst}};
-        if (job.request.target_error > 0) json["tables"][table->name]["cells_above_target"] = above;
+        json["tables"][table->name()] = {{"cells", table->cells()},
+                                         {"bins", table->bins()},
+                                         {"method", table->method},
+                                         {"worst_standard_error", worst}};
+        if (job.request.target_error > 0) json["tables"][table->name()]["cells_above_target"] = above;
         if (!words.json && above > 0)
-            fmt::print("{}: {} of {} cells did not reach {:g}\n", table->name, above, table->cells(),
-                       job.request.target_error);
+            print("{}: {} of {} cells did not reach {:g}\n", table->name(), above, table->cells(),
+                  job.request.target_error);
         if (!words.json)
-            fmt::print("{}: {} x {} bins, {}, worst relative standard error of a lobe {:.2e}\n", table->name,
-                       counted(table->cells(), "cell"), table->bins(), table->method, worst);
+            print("{}: {} x {} bins, {}, worst relative standard error of a lobe {:.2e}\n", table->name(),
+                  counted(table->cells(), "cell"), table->bins(), table->method, worst);
     }
     if (words.json)
-        fmt::print("{}\n", json.dump());
+        print("{}\n", json_line(json));
     else if (report.was_complete)
-        fmt::print("{} is complete\n", words.output);
+        print("{} is complete\n", words.output);
     else
-        fmt::print("{} written in {}\n", words.output, duration_text(seconds));
+        print("{} written in {}\n", words.output, duration_text(seconds));
 }
 
 void declare(CLI::App& app, Words& words) {
@@ -225,7 +234,8 @@ void declare(CLI::App& app, Words& words) {
                    "paths (default: none; N 8)");
     app.add_option("--scene", words.scene, "scene file (JSON): only the nodes that its materials can ask for");
     app.add_flag("--dry-run", words.dry_run, "say what would be simulated and how long it will take; write nothing");
-    app.add_option("--bins", words.bins, "exit directions over the full circle, even")->capture_default_str();
+    add_number(app, "--bins", words.bins, "exit directions over the full circle, even", {8, 4096})
+        ->capture_default_str();
     app.add_option(
            "--method", words.method,
            fmt::format("how each cell is solved. deterministic: without noise, on grids for a relative L2 error "
@@ -238,24 +248,27 @@ void declare(CLI::App& app, Words& words) {
     // Each excludes the others. (An option group would do it too, but CLI11 2.1 does not end on stray words beside
     // one.)
     CLI::Option* paths =
-        app.add_option("--paths", words.paths,
-                       "paths per cell of the random methods; without another stopping rule, auto's measure of a grid")
+        add_number(app, "--paths", words.paths,
+                   "paths per cell of the random methods; without another stopping rule, auto's measure of a grid",
+                   {1, most_paths})
             ->capture_default_str();
     CLI::Option* target =
-        app.add_option("--target-error", words.target_error,
-                       fmt::format("instead: relative L2 standard error below which each cell is solved, {:g} to {:g}",
-                                   least_target, greatest_target))
+        add_number(app, "--target-error", words.target_error,
+                   fmt::format("instead: relative L2 standard error below which each cell is solved, {:g} to {:g}",
+                               least_target, greatest_target),
+                   {least_target, greatest_target})
             ->excludes(paths);
-    app.add_option(
-           "--time-budget", words.time_budget,
-           "instead: seconds for the job, spent where error falls most (results then depend on the machine's speed)")
+    add_number(
+        app, "--time-budget", words.time_budget,
+        "instead: seconds for the job, spent where error falls most (results then depend on the machine's speed)",
+        above_zero)
         ->excludes(paths, target);
-    app.add_option("--seed", words.seed, "of the random methods")->capture_default_str();
-    app.add_option("--threads", words.threads, "0: all")->capture_default_str();
+    add_number(app, "--seed", words.seed, "of the random methods")->capture_default_str();
+    add_number(app, "--threads", words.threads, "0: all", {0, 1024})->capture_default_str();
     app.add_flag("--resume", words.resume, "go on from the slices kept in OUTPUT.shards/");
     app.add_option("--shard", words.shard,
                    "I/N: solve the I-th of N shares (1 <= I <= N) into OUTPUT.shards/, for furtable merge; auto: from "
-                   "SLURM_ARRAY_TASK_ID, _COUNT or OMPI_COMM_WORLD_RANK, _SIZE; none")
+                   "the environment that a Slurm array, srun or an MPI launcher makes; none")
         ->capture_default_str();
     app.add_option("--compression", words.compression, "of the tables file")
         ->check(CLI::IsMember({"zstd", "gzip", "none"}))

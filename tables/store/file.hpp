@@ -1,21 +1,31 @@
 // Whole files, safely: read into memory, and replaced in one step (temporary name, fsync, rename, fsync of the folder).
+// Nothing but a plain file is ever renamed over or removed.
 #pragma once
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace medulla::tables {
 
-/// All bytes of a file; throws Error that names it, also where it holds more than `most` bytes.
+/// All bytes of a plain file; throws Error that names it, also where it holds more than `most` bytes. Never waits: a
+/// pipe or a device is refused.
 std::vector<unsigned char> read_file(const std::string& path,
                                      std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
 
-/// `<path>.tmp-<host>-<process>-<number>`: no two processes of a cluster make the same one.
+/// Throws Error that says why, unless `path` is a plain file that can be read.
+void require_readable(const std::string& path);
+
+/// `<path>.tmp-<host>-<process>-<number>`: no two processes of a cluster make the same one. Where such a name is longer
+/// than the folder takes, one without the file's own name.
 std::string temporary_name(const std::string& path);
 
-/// A file that appears under its name only when commit() is called, whole and on disk; otherwise nothing is left.
+/// Throws Error where the last part of `path` is longer than its folder takes.
+void check_name(const std::string& path);
+
+/// A plain file that appears under its name only when commit() is called, whole and on disk; otherwise nothing is left.
 class PendingFile {
   public:
     /// Makes the temporary file; by default beside `path`, always on its file system.
@@ -24,7 +34,6 @@ class PendingFile {
     PendingFile(const PendingFile&) = delete;
     PendingFile& operator=(const PendingFile&) = delete;
 
-    const std::string& temporary() const { return temporary_; }
     void write(const void* data, std::size_t size);
     void commit();
 
@@ -37,13 +46,13 @@ class PendingFile {
 void write_file(const std::string& path, const void* data, std::size_t size);
 void write_file(const std::string& path, const std::string& text);
 
-/// Throws Error if `output` is one of the files that are read: nothing is written over an input.
-void refuse_input(const std::string& output, const std::vector<std::string>& inputs);
-
-/// Brings a folder's list of names to disk. Throws Error.
+/// Brings a folder's list of names to disk, where its file system can. Throws Error where that failed.
 void sync_folder(const std::string& path);
 
 /// Folder of a path: "." where it names none.
 std::string folder_of(const std::string& path);
+
+/// "folder", "pipe", "block device" .. of a file mode.
+const char* kind_name(std::uint32_t mode);
 
 }  // namespace medulla::tables

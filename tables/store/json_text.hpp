@@ -1,4 +1,5 @@
-// JSON from outside: parsed only as deep as ours ever is, since walking over it (dump, copies) recurses.
+// JSON and text from outside: parsed only as deep as ours ever is, since walking over it (dump, copies) recurses; names
+// of files are bytes, of which JSON holds only UTF-8.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,6 +10,16 @@
 namespace medulla::tables {
 
 inline constexpr int deepest_json = 8;
+
+/// Bytes as text that JSON holds and from which they can be told again: a byte that is no part of a UTF-8 character is
+/// written \xHH, a backslash as two.
+std::string json_name(const std::string& bytes);
+
+/// JSON on one line, whatever bytes its strings hold: what is no UTF-8 there becomes U+FFFD.
+template <class Json>
+std::string json_line(const Json& json) {
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
 
 /// Throws Error that begins with `where` for text that is no JSON or nests deeper than deepest_json.
 template <class Json = nlohmann::json>

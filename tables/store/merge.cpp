@@ -15,13 +15,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// One argument: the axes it knows, and the slices it holds.
-struct Part {
+/// One argument: its axes and the slices that it has.
+struct Input {
     std::string path;
     Tables tables;                        ///< arrays are empty where `folder` is set
-    std::unique_ptr<ShardFolder> folder;  ///< refers to `tables`
+    std::unique_ptr<SliceFolder> folder;  ///< refers to `tables`
 
-    std::vector<SliceId> held() const {
+    std::vector<SliceId> available() const {
         std::vector<SliceId> ids = slices_of(tables);
         if (folder)
             ids.erase(std::remove_if(ids.begin(), ids.end(),
@@ -39,36 +39,36 @@ struct Part {
     }
 };
 
-std::unique_ptr<Part> open_part(const std::string& path) {
-    auto part = std::make_unique<Part>();
-    part->path = path;
+std::unique_ptr<Input> open_input(const std::string& path) {
+    auto input = std::make_unique<Input>();
+    input->path = path;
     std::error_code ignored;
-    const std::string beside = ShardFolder::beside(path);
+    const std::string beside = SliceFolder::beside(path);
     if (fs::is_directory(path, ignored))
-        part->path = path;
+        input->path = path;
     else if (!fs::exists(path, ignored) && fs::is_directory(beside, ignored))
-        part->path = beside;
+        input->path = beside;
     else {
-        part->tables = read_tables(path);
-        return part;
+        input->tables = read_tables(path);
+        return input;
     }
-    part->tables = read_configuration(part->path);
-    part->folder = std::make_unique<ShardFolder>(part->path, part->tables);
-    return part;
+    input->tables = read_configuration(input->path);
+    input->folder = std::make_unique<SliceFolder>(input->path, input->tables);
+    return input;
 }
 
-/// Takes what a further part knows of a table into the merged axes.
+/// Adds the axes of a further input to the merged table.
 void extend(std::optional<Table>& merged, const Table& other, const std::string& path) {
     if (!merged) {
         merged.emplace();
-        merged->name = other.name, merged->axes = other.axes, merged->method = other.method;
+        merged->id = other.id, merged->axes = other.axes, merged->method = other.method;
         merged->seed = other.seed, merged->paths = other.paths;
         merged->target_error = other.target_error, merged->time_budget = other.time_budget;
         return;
     }
     const auto differ = [&](const char* what, const std::string& expected, const std::string& found) {
         if (expected != found)
-            throw Error("{}: /{}: expected {} {} as in the parts before, found {}", path, other.name, what, expected,
+            throw Error("{}: /{}: expected {} {} as in the parts before, found {}", path, other.name(), what, expected,
                         found);
     };
     differ("method", merged->method, other.method);
@@ -87,7 +87,7 @@ void extend(std::optional<Table>& merged, const Table& other, const std::string&
         const std::vector<double>& from = other.axes[k].values;
         if (into == from) continue;
         if (k + 1 == merged->axes.size())
-            throw Error("{}: /{}/{}: expected the values of the parts before, found others", path, other.name,
+            throw Error("{}: /{}/{}: expected the values of the parts before, found others", path, other.name(),
                         other.axes[k].name);
         std::vector<double> both;
         std::set_union(into.begin(), into.end(), from.begin(), from.end(), std::back_inserter(both));
@@ -132,45 +132,44 @@ bool same_cell(const Slice& slice, std::size_t c, const Table& table, std::size_
 }  // namespace
 
 Tables merge(const std::vector<std::string>& paths) {
-    std::vector<std::unique_ptr<Part>> parts;
-    for (const std::string& path : paths) parts.push_back(open_part(path));
+    std::vector<std::unique_ptr<Input>> inputs;
+    for (const std::string& path : paths) inputs.push_back(open_input(path));
     Tables merged;
-    for (const auto& part : parts) {
-        if (merged.program.empty()) merged.program = part->tables.program;
-        if (merged.program != part->tables.program)
-            throw Error("{}: expected a part by {}, found one by {}", part->path, merged.program, part->tables.program);
-        if (part->tables.azimuthal) extend(merged.azimuthal, *part->tables.azimuthal, part->path);
-        if (part->tables.longitudinal) extend(merged.longitudinal, *part->tables.longitudinal, part->path);
+    for (const auto& input : inputs) {
+        if (merged.program.empty()) merged.program = input->tables.program;
+        if (merged.program != input->tables.program)
+            throw Error("{}: expected a part by {}, found one by {}", input->path, merged.program,
+                        input->tables.program);
+        for (const Table* table : input->tables.present()) extend(merged[table->id], *table, input->path);
     }
-    std::map<TableName, std::vector<const Part*>> holders;  // of each cell
-    for (const TableName name : {TableName::azimuthal, TableName::longitudinal}) {
-        auto& table = name == TableName::azimuthal ? merged.azimuthal : merged.longitudinal;
-        if (!table) continue;
-        table->allocate();
-        holders[name].resize(table->cells());
-    }
-    for (const auto& part : parts)
-        for (const SliceId& id : part->held()) {
-            Table& to = table_of(merged, id.table);
-            const std::vector<std::size_t> cells = places(table_of(part->tables, id.table), id, to);
-            const Slice slice = part->slice(id);
+    std::map<TableId, std::vector<const Input*>> owners;  // of each cell: the first input that has it
+    for (const TableId id : table_ids)
+        if (std::optional<Table>& table = merged[id]) {
+            table->allocate();
+            owners[id].resize(table->cells());
+        }
+    for (const auto& input : inputs)
+        for (const SliceId& id : input->available()) {
+            Table& to = merged.at(id.table);
+            const std::vector<std::size_t> cells = places(input->tables.at(id.table), id, to);
+            const Slice slice = input->slice(id);
             for (std::size_t c = 0; c < cells.size(); ++c) {
-                const Part*& holder = holders[id.table][cells[c]];
-                if (holder && !same_cell(slice, c, to, cells[c]))
-                    throw Error("{} and {} hold different values of {} {}", holder->path, part->path, to.name,
+                const Input*& owner = owners[id.table][cells[c]];
+                if (owner && !same_cell(slice, c, to, cells[c]))
+                    throw Error("{} and {} have different values of {} {}", owner->path, input->path, to.name(),
                                 to.describe(cells[c]));
-                if (holder) continue;
-                holder = part.get();
+                if (owner) continue;
+                owner = input.get();
                 put_cell(slice, c, to, cells[c]);
             }
         }
-    for (const auto& [name, held] : holders) {
-        const auto missing = std::count(held.begin(), held.end(), nullptr);
+    for (const auto& [id, cells] : owners) {
+        const auto missing = std::count(cells.begin(), cells.end(), nullptr);
         if (missing == 0) continue;
-        const auto first = std::find(held.begin(), held.end(), nullptr) - held.begin();
-        const Table& table = table_of(merged, name);
-        throw Error("{}: {} of {} cells of {} are missing, the first is {}", parts.front()->path, missing, held.size(),
-                    table.name, table.describe(static_cast<std::size_t>(first)));
+        const auto first = std::find(cells.begin(), cells.end(), nullptr) - cells.begin();
+        const Table& table = merged.at(id);
+        throw Error("{}: {} of {} cells of {} are missing, the first is {}", inputs.front()->path, missing,
+                    cells.size(), table.name(), table.describe(static_cast<std::size_t>(first)));
     }
     return merged;
 }

@@ -14,7 +14,9 @@
 
 #include "tables/error.hpp"
 #include "tables/store/file.hpp"
+#include "tables/store/job_difference.hpp"
 #include "tables/store/json_text.hpp"
+#include "tables/streams.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -22,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char magic[8] = {'F', 'U', 'R', 'S', 'H', 'A', 'R', 'D'};
-constexpr std::uint64_t greatest_shard = std::uint64_t{1} << 30;
+constexpr std::uint64_t greatest_slice_file = std::uint64_t{1} << 30;
 constexpr std::uint64_t greatest_configuration = std::uint64_t{1} << 22;
 constexpr const char* suffix = ".shard";
 
@@ -48,9 +50,16 @@ std::vector<std::string> names_in(const std::string& folder) {
     return names;
 }
 
+/// Removes a file of ours; what is no plain file is not.
+void remove_plain(const std::string& file) {
+    struct stat info = {};
+    if (::lstat(file.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) return;
+    if (::unlink(file.c_str()) != 0 && errno != ENOENT) note("{}: cannot be removed: {}\n", file, std::strerror(errno));
+}
+
 struct Inspected {
     std::vector<unsigned char> bytes;
-    ShardHeader header = {};
+    SliceFileHeader header = {};
     std::string damage;  ///< empty: whole
 
     Digest configuration() const {
@@ -60,18 +69,12 @@ struct Inspected {
     }
 };
 
-void refuse_other(const std::string& file, const Digest& found, const Digest& expected) {
-    if (found != expected)
-        throw Error("{}: expected configuration {}, found {}: it belongs to another job", file, hex(expected),
-                    hex(found));
-}
-
 /// Reads a shard of whatever configuration and checks that it is what was written.
 Inspected inspect(const std::string& path) {
     Inspected found;
-    found.bytes = read_file(path, greatest_shard);
+    found.bytes = read_file(path, greatest_slice_file);
     const std::size_t size = found.bytes.size(), digest_size = sizeof(Digest);
-    if (size < sizeof(ShardHeader) + digest_size) {
+    if (size < sizeof(SliceFileHeader) + digest_size) {
         found.damage = fmt::format("only {} bytes", size);
         return found;
     }
@@ -90,43 +93,48 @@ Inspected inspect(const std::string& path) {
 
 }  // namespace
 
-ShardFolder::ShardFolder(std::string path, const Tables& plan)
+SliceFolder::SliceFolder(std::string path, const Tables& plan)
     : path_(std::move(path)),
       plan_(plan),
       configuration_text_(tables::configuration_text(plan)),
       configuration_(configuration_hash(plan)) {}
 
-ShardFolder::~ShardFolder() {
+SliceFolder::~SliceFolder() {
     if (lock_ >= 0) ::close(lock_);
 }
 
-std::string ShardFolder::file_of(const SliceId& id) const {
+std::string SliceFolder::file_of(const SliceId& id) const {
     return fmt::format("{}/{}-s{:04}-g{:04}{}", path_, name_of(id.table), id.sigma, id.g, suffix);
 }
 
-std::string ShardFolder::scratch() const { return temporary_name(path_ + "/tables.h5"); }
+std::string SliceFolder::scratch() const { return temporary_name(path_ + "/tables.h5"); }
 
-std::vector<std::string> ShardFolder::files() const {
+std::vector<std::string> SliceFolder::files() const {
     std::vector<std::string> list;
     for (const std::string& name : names_in(path_))
         if (ends_with(name, suffix)) list.push_back(path_ + "/" + name);
     return list;
 }
 
-void ShardFolder::open(bool alone) {
+void SliceFolder::open(bool alone) {
+    struct stat info = {};
     if (::mkdir(path_.c_str(), 0777) == 0)
         sync_folder(folder_of(path_));
     else if (errno != EEXIST)
         throw Error("{}: cannot be made: {}", path_, std::strerror(errno));
+    else if (::stat(path_.c_str(), &info) == 0 && !S_ISDIR(info.st_mode))
+        throw Error("{}: expected a folder, found a {}", path_, kind_name(info.st_mode));
     lock_ = ::open((path_ + "/lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (lock_ < 0) throw Error("{}/lock: cannot be written: {}", path_, std::strerror(errno));
-    // A file system without locks (ENOLCK, EOPNOTSUPP) is no reason not to work on it.
-    if (::flock(lock_, (alone ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0 && errno == EWOULDBLOCK)
-        throw Error("{}: another medulla-precompute is at work on it", path_);
+    if (::flock(lock_, (alone ? LOCK_EX : LOCK_SH) | LOCK_NB) != 0) {
+        if (errno == EWOULDBLOCK) throw Error("{}: another medulla-precompute is at work on it", path_);
+        // A file system without locks (ENOLCK, ENOSYS, EOPNOTSUPP) is no reason not to work on it.
+        note("{}: this file system has no locks ({}): start no second run there\n", path_, std::strerror(errno));
+    }
     alone_ = alone;
     if (alone)
         for (const std::string& name : names_in(path_))
-            if (is_temporary(name)) ::unlink((path_ + "/" + name).c_str());
+            if (is_temporary(name)) remove_plain(path_ + "/" + name);
 
     const std::string json = path_ + "/configuration.json";
     if (fs::exists(json)) {
@@ -136,24 +144,36 @@ void ShardFolder::open(bool alone) {
         // Its shards say whose the folder is; without any, a whole run takes it over.
         for (const std::string& file : files()) {
             const Inspected found = inspect(file);
-            if (found.damage.empty()) refuse_other(file, found.configuration(), configuration_);
+            if (found.damage.empty()) refuse_other(file, found.configuration());
         }
-        if (!alone) refuse_other(json, sha256(text), configuration_);
+        if (!alone) refuse_other(json, sha256(text));
     }
     write_file(json, configuration_text_);
 }
 
-std::optional<Slice> ShardFolder::read(const SliceId& id, std::string& why) const {
+void SliceFolder::refuse_other(const std::string& file, const Digest& found) const {
+    if (found == configuration_) return;
+    std::string difference;
+    try {
+        const Tables other = read_configuration(path_);
+        if (configuration_hash(other) == found) difference = job_difference(plan_, other);
+    } catch (const Error&) {  // then nothing is left that names that job's options
+    }
+    if (difference.empty()) difference = "expected the options of this job, found others";
+    throw Error("{}: it belongs to another job: {}", file, difference);
+}
+
+std::optional<Slice> SliceFolder::read(const SliceId& id, std::string& why) const {
     const std::string file = file_of(id);
     const Inspected found = inspect(file);
     why = found.damage;
     if (!why.empty()) return std::nullopt;
-    const ShardHeader& header = found.header;
-    refuse_other(file, found.configuration(), configuration_);
-    const Table& table = table_of(plan_, id.table);
+    const SliceFileHeader& header = found.header;
+    refuse_other(file, found.configuration());
+    const Table& table = plan_.at(id.table);
     Slice slice(slice_cells(table), table.bins());
     const std::size_t size = sizeof header + slice.cells * (4 * sizeof(double) + slice.bins * sizeof(float)) + 32;
-    if (header.version != shard_version || header.table != static_cast<std::uint32_t>(id.table) ||
+    if (header.version != slice_file_version || header.table != static_cast<std::uint32_t>(id.table) ||
         header.sigma != id.sigma || header.g != id.g || header.cells != slice.cells || header.bins != slice.bins ||
         found.bytes.size() != size) {
         why = "it holds another slice than its name says";
@@ -169,7 +189,7 @@ std::optional<Slice> ShardFolder::read(const SliceId& id, std::string& why) cons
     return slice;
 }
 
-std::vector<bool> ShardFolder::kept(const std::vector<SliceId>& ids) const {
+std::vector<bool> SliceFolder::kept(const std::vector<SliceId>& ids) const {
     const std::vector<std::string> there = files();
     std::vector<bool> good(ids.size(), false);
     for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -177,15 +197,15 @@ std::vector<bool> ShardFolder::kept(const std::vector<SliceId>& ids) const {
         if (!std::binary_search(there.begin(), there.end(), file)) continue;
         std::string why;
         good[i] = read(ids[i], why).has_value();
-        if (!good[i]) fmt::print(stderr, "{}: damaged ({}); solving it again\n", file, why);
+        if (!good[i]) note("{}: damaged ({}); solving it again\n", file, why);
     }
     return good;
 }
 
-void ShardFolder::write(const SliceId& id, const Slice& slice) const {
-    ShardHeader header = {};
+void SliceFolder::write(const SliceId& id, const Slice& slice) const {
+    SliceFileHeader header = {};
     std::memcpy(header.magic, magic, sizeof magic);
-    header.version = shard_version;
+    header.version = slice_file_version;
     header.table = static_cast<std::uint32_t>(id.table);
     std::memcpy(header.configuration, configuration_.data(), configuration_.size());
     header.sigma = id.sigma, header.g = id.g;
@@ -205,16 +225,18 @@ void ShardFolder::write(const SliceId& id, const Slice& slice) const {
     file.commit();
 }
 
-void ShardFolder::remove() {
+void SliceFolder::remove() {
     for (const std::string& name : names_in(path_))
         if (ends_with(name, suffix) || is_temporary(name) || name == "configuration.json" || name == "lock")
-            if (::unlink((path_ + "/" + name).c_str()) != 0 && errno != ENOENT)
-                throw Error("{}/{}: cannot be removed: {}", path_, name, std::strerror(errno));
-    if (::rmdir(path_.c_str()) != 0 && errno != ENOENT)
-        throw Error("{}: cannot be removed: {}", path_, std::strerror(errno));
+            remove_plain(path_ + "/" + name);
+    // NFS keeps a file that is open under another name, until it is closed.
+    if (lock_ >= 0) ::close(std::exchange(lock_, -1));
+    const bool kept = ::rmdir(path_.c_str()) != 0 && errno != ENOENT && errno != ENOTEMPTY && errno != EEXIST;
+    if (kept && errno != ENOTDIR)  // a symbolic link to the folder
+        note("{}: cannot be removed: {}\n", path_, std::strerror(errno));
 }
 
-void ShardFolder::remove_if_empty() {
+void SliceFolder::remove_if_empty() {
     if (alone_ && files().empty()) remove();
 }
 
@@ -229,9 +251,9 @@ double number_of(const nlohmann::ordered_json& json, const std::string& where) {
     return value;
 }
 
-Table planned_table(const nlohmann::ordered_json& json, const std::string& name, const std::string& where) {
+Table planned_table(const nlohmann::ordered_json& json, TableId id, const std::string& where) {
     Table table;
-    table.name = name;
+    table.id = id;
     table.method = json.at("method").get<std::string>();
     table.seed = json.at("seed").get<std::uint64_t>();
     table.paths = json.at("paths").get<std::uint64_t>();
@@ -257,10 +279,9 @@ Tables read_configuration(const std::string& folder) {
         const auto json = parse_json<nlohmann::ordered_json>(text, text + bytes.size(), path);
         plan.program = json.at("program").get<std::string>();
         const auto& tables = json.at("tables");
-        if (tables.contains("azimuthal"))
-            plan.azimuthal = planned_table(tables["azimuthal"], "azimuthal", path + ": /azimuthal");
-        if (tables.contains("longitudinal"))
-            plan.longitudinal = planned_table(tables["longitudinal"], "longitudinal", path + ": /longitudinal");
+        for (const TableId id : table_ids)
+            if (tables.contains(name_of(id)))
+                plan[id] = planned_table(tables[name_of(id)], id, fmt::format("{}: /{}", path, name_of(id)));
     } catch (const nlohmann::json::exception& error) {
         throw Error("{}: expected a job's configuration: {}", path, error.what());
     }

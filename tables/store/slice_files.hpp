@@ -13,25 +13,22 @@ namespace medulla::tables {
 
 /// First bytes of a shard; all numbers little-endian. After it: energy, energy_error, standard_error, mean_length
 /// (float64[cells]), lobe (float32[cells][bins]), SHA-256 of all before.
-struct ShardHeader {
+struct SliceFileHeader {
     char magic[8];                    ///< "FURSHARD"
-    std::uint32_t version;            ///< shard_version
-    std::uint32_t table;              ///< a TableName
+    std::uint32_t version;            ///< slice_file_version
+    std::uint32_t table;              ///< a TableId
     unsigned char configuration[32];  ///< configuration_hash of the job
     std::uint32_t sigma, g;           ///< place on the axes
     std::uint64_t cells, bins;
 };
-static_assert(sizeof(ShardHeader) == 72);
-inline constexpr std::uint32_t shard_version = 1;
+static_assert(sizeof(SliceFileHeader) == 72);
+inline constexpr std::uint32_t slice_file_version = 1;
 
-/// How a shard was found.
-enum class ShardState { missing, good, damaged };
-
-class ShardFolder {
+class SliceFolder {
   public:
     /// Names the folder of a plan; touches no file.
-    ShardFolder(std::string path, const Tables& plan);
-    ~ShardFolder();
+    SliceFolder(std::string path, const Tables& plan);
+    ~SliceFolder();
 
     /// `<output>.shards`
     static std::string beside(const std::string& output) { return output + ".shards"; }
@@ -61,12 +58,16 @@ class ShardFolder {
     /// A name inside the folder for the tables file in work: the folder's removal takes it along.
     std::string scratch() const;
 
-    /// Removes everything of ours and the folder. What is not ours keeps it there.
+    /// Removes everything of ours and the folder. What is not ours keeps it there; what cannot be removed is told on
+    /// standard error, since the job is done.
     void remove();
     /// Removes the folder if it keeps no slice and nobody else works on it.
     void remove_if_empty();
 
   private:
+    /// Throws Error that says in which options the job of `file`, of configuration `found`, is another one.
+    void refuse_other(const std::string& file, const Digest& found) const;
+
     std::string path_;
     const Tables& plan_;
     std::string configuration_text_;

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tables/error.hpp"
+#include "tables/store/json_text.hpp"
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "shards and hashes are little-endian, copied as they lie");
 
@@ -14,13 +15,11 @@ namespace {
 std::size_t place(const Table& table, const SliceId& id) {
     const std::size_t sigmas = table.axis("sigma").size(), gs = table.axis("g").size();
     if (id.sigma >= sigmas || id.g >= gs)
-        throw Error("{}: no slice {}, {}: the table has {} x {}", table.name, id.sigma, id.g, sigmas, gs);
+        throw Error("{}: no slice {}, {}: the table has {} x {}", table.name(), id.sigma, id.g, sigmas, gs);
     return id.sigma * gs + id.g;
 }
 
 }  // namespace
-
-const char* name_of(TableName table) { return table == TableName::azimuthal ? "azimuthal" : "longitudinal"; }
 
 Slice::Slice(std::size_t cell_count, std::size_t bin_count)
     : cells(cell_count), bins(bin_count), lobe(cells * bins, 0.0f) {
@@ -31,29 +30,18 @@ std::size_t slice_cells(const Table& table) {
     return table.cells() / (table.axis("sigma").size() * table.axis("g").size());
 }
 
-Table& table_of(Tables& tables, TableName name) {
-    auto& table = name == TableName::azimuthal ? tables.azimuthal : tables.longitudinal;
-    if (!table) throw Error("there is no {} table", name_of(name));
-    return *table;
-}
-
-const Table& table_of(const Tables& tables, TableName name) { return table_of(const_cast<Tables&>(tables), name); }
-
 std::vector<SliceId> slices_of(const Tables& plan) {
     std::vector<SliceId> list;
-    for (const TableName name : {TableName::azimuthal, TableName::longitudinal}) {
-        const auto& table = name == TableName::azimuthal ? plan.azimuthal : plan.longitudinal;
-        if (!table) continue;
+    for (const Table* table : plan.present())
         for (std::uint32_t s = 0; s < table->axis("sigma").size(); ++s)
-            for (std::uint32_t g = 0; g < table->axis("g").size(); ++g) list.push_back({name, s, g});
-    }
+            for (std::uint32_t g = 0; g < table->axis("g").size(); ++g) list.push_back({table->id, s, g});
     return list;
 }
 
 void put_slice(Tables& tables, const SliceId& id, const Slice& slice) {
-    Table& table = table_of(tables, id.table);
+    Table& table = tables.at(id.table);
     if (slice.cells != slice_cells(table) || slice.bins != table.bins())
-        throw Error("{}: expected a slice of {} x {}, found {} x {}", table.name, slice_cells(table), table.bins(),
+        throw Error("{}: expected a slice of {} x {}, found {} x {}", table.name(), slice_cells(table), table.bins(),
                     slice.cells, slice.bins);
     const std::size_t first = place(table, id) * slice.cells;
     std::copy(slice.lobe.begin(), slice.lobe.end(), table.lobe.begin() + first * slice.bins);
@@ -63,7 +51,7 @@ void put_slice(Tables& tables, const SliceId& id, const Slice& slice) {
 }
 
 Slice take_slice(const Tables& tables, const SliceId& id) {
-    const Table& table = table_of(tables, id.table);
+    const Table& table = tables.at(id.table);
     Slice slice(slice_cells(table), table.bins());
     const std::size_t first = place(table, id) * slice.cells;
     std::copy_n(table.lobe.begin() + first * slice.bins, slice.lobe.size(), slice.lobe.begin());
@@ -74,16 +62,16 @@ Slice take_slice(const Tables& tables, const SliceId& id) {
 }
 
 std::string describe(const Tables& plan, const SliceId& id) {
-    const Table& table = table_of(plan, id.table);
-    return fmt::format("{} sigma {:g}, g {:g}", table.name, table.axis("sigma").values.at(id.sigma),
+    const Table& table = plan.at(id.table);
+    return fmt::format("{} sigma {:g}, g {:g}", table.name(), table.axis("sigma").values.at(id.sigma),
                        table.axis("g").values.at(id.g));
 }
 
 std::string configuration_text(const Tables& plan) {
-    nlohmann::ordered_json json = {{"program", plan.program}};
+    nlohmann::ordered_json json = {{"program", json_name(plan.program)}};
     for (const Table* table : plan.present()) {
-        nlohmann::ordered_json& out = json["tables"][table->name];
-        out["method"] = table->method;
+        nlohmann::ordered_json& out = json["tables"][table->name()];
+        out["method"] = json_name(table->method);
         out["seed"] = table->seed;
         out["paths"] = table->paths;
         // Only where they are set: a job without them keeps its text.
@@ -110,7 +98,7 @@ Digest contents_hash(const Tables& tables) {
         hash.add(values.data(), values.size() * sizeof values[0]);
     };
     for (const Table* table : tables.present()) {
-        name(table->name);
+        name(table->name());
         for (const Axis& axis : table->axes) array(axis.name, axis.values);
         array("lobe", table->lobe);
         array("energy", table->energy);

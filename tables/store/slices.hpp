@@ -11,13 +11,12 @@
 
 namespace medulla::tables {
 
-/// The numbers are part of the shard format.
-enum class TableName : std::uint32_t { azimuthal = 0, longitudinal = 1 };
-const char* name_of(TableName table);
+/// Most numbers in the lobes of one slice, which is one chunk of the tables file.
+inline constexpr std::size_t most_slice_values = 4096 * 4096;
 
 /// Place of a slice: indices into the table's sigma and g axes.
 struct SliceId {
-    TableName table = TableName::azimuthal;
+    TableId table = TableId::azimuthal;
     std::uint32_t sigma = 0, g = 0;
 
     bool operator==(const SliceId& other) const { return table == other.table && sigma == other.sigma && g == other.g; }
@@ -41,9 +40,6 @@ auto cell_arrays(T& of) {
 
 /// Cells of one slice of a table: everything behind sigma and g but the exit direction.
 std::size_t slice_cells(const Table& table);
-
-const Table& table_of(const Tables& tables, TableName name);  ///< throws Error if there is none
-Table& table_of(Tables& tables, TableName name);
 
 /// All slices of the tables present, azimuthal first, g fastest. `plan` needs its axes only.
 std::vector<SliceId> slices_of(const Tables& plan);

@@ -2,12 +2,13 @@
 
 #include <hdf5.h>
 #include <hdf5_hl.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <functional>
+#include <memory>
 #include <mutex>
 
 #include "tables/error.hpp"
@@ -22,6 +23,8 @@ constexpr const char* format_name = "medulla tables";
 constexpr std::uint64_t format_version = 2, first_with_hash = 2;
 constexpr std::size_t image_step = std::size_t{1} << 24;  // bytes by which a file in memory grows
 constexpr unsigned zstd_level = 9;
+constexpr std::size_t longest_text = 65536;
+constexpr std::size_t most_expansion = 1 << 15;  // zstd: 128 KiB of equal bytes are a block of 4 bytes
 
 /// An HDF5 id that closes itself.
 class Handle {
@@ -157,9 +160,9 @@ void describe_array(hid_t group, const std::string& name, const char* unit, cons
 }
 
 void write_table(hid_t file, const Table& table, Compression compression, const std::string& path) {
-    const std::string where = fmt::format("{}: /{}", path, table.name);
+    const std::string where = fmt::format("{}: /{}", path, table.name());
     const Handle properties = untracked(H5P_GROUP_CREATE, where);
-    const Handle group(H5Gcreate2(file, table.name.c_str(), H5P_DEFAULT, properties, H5P_DEFAULT), H5Gclose,
+    const Handle group(H5Gcreate2(file, table.name(), H5P_DEFAULT, properties, H5P_DEFAULT), H5Gclose,
                        where + ": cannot be written");
     write_attribute(group, "method", table.method, where);
     write_attribute(group, "seed", table.seed, where);
@@ -206,18 +209,31 @@ void write_table(hid_t file, const Table& table, Compression compression, const 
 
 // --- reading ---------------------------------------------------------------------------------------------------
 
+/// One value of an attribute: whatever HDF5 calls a string, of fixed or variable length, padded in any way.
 std::string read_text(hid_t object, const char* name, const std::string& where) {
     const std::string failed = fmt::format("{}: expected text in attribute {}, found none", where, name);
     const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, failed);
     const Handle type(H5Aget_type(attribute), H5Tclose, failed);
-    const std::size_t size = H5Tget_size(type);
-    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) != 0 || size == 0 || size > 65536)
-        throw Error("{}", failed);
     const Handle space(H5Aget_space(attribute), H5Sclose, failed);
-    if (H5Sget_simple_extent_npoints(space) != 1) throw Error("{}", failed);
-    std::string text(size, '\0');
-    check(H5Aread(attribute, type, text.data()), failed);
-    return text.c_str();
+    if (H5Tget_class(type) != H5T_STRING || H5Sget_simple_extent_npoints(space) != 1) throw Error("{}", failed);
+    std::string text;
+    if (H5Tis_variable_str(type) > 0) {
+        const Handle memory(H5Tcopy(type), H5Tclose, failed);
+        char* value = nullptr;
+        check(H5Aread(attribute, memory, &value), failed);
+        const std::unique_ptr<char, herr_t (*)(void*)> owned(value, H5free_memory);
+        if (value) text.assign(value, ::strnlen(value, longest_text + 1));
+    } else {
+        const std::size_t size = H5Tget_size(type);
+        if (size == 0 || size > longest_text) throw Error("{}", failed);
+        text.resize(size);
+        check(H5Aread(attribute, type, text.data()), failed);
+        text.resize(::strnlen(text.data(), size));
+        if (H5Tget_strpad(type) == H5T_STR_SPACEPAD) text.erase(text.find_last_not_of(' ') + 1);
+    }
+    if (text.size() > longest_text)
+        throw Error("{}: expected at most {} bytes of text in attribute {}", where, longest_text, name);
+    return text;
 }
 
 std::uint64_t read_whole(hid_t object, const char* name, const std::string& where) {
@@ -226,6 +242,11 @@ std::uint64_t read_whole(hid_t object, const char* name, const std::string& wher
     const Handle type(H5Aget_type(attribute), H5Tclose, failed);
     const Handle space(H5Aget_space(attribute), H5Sclose, failed);
     if (H5Tget_class(type) != H5T_INTEGER || H5Sget_simple_extent_npoints(space) != 1) throw Error("{}", failed);
+    if (H5Tget_sign(type) == H5T_SGN_2) {
+        std::int64_t number = 0;  // HDF5 would make 0 of what is below it
+        check(H5Aread(attribute, H5T_NATIVE_INT64, &number), failed);
+        if (number < 0) throw Error("{}: expected 0 or more in attribute {}, found {}", where, name, number);
+    }
     std::uint64_t value = 0;
     check(H5Aread(attribute, H5T_NATIVE_UINT64, &value), failed);
     return value;
@@ -240,7 +261,9 @@ double read_optional(hid_t object, const char* name, const std::string& where) {
     const Handle attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, failed);
     const Handle type(H5Aget_type(attribute), H5Tclose, failed);
     const Handle space(H5Aget_space(attribute), H5Sclose, failed);
-    if (H5Tget_class(type) != H5T_FLOAT || H5Sget_simple_extent_npoints(space) != 1) throw Error("{}", failed);
+    const H5T_class_t number = H5Tget_class(type);
+    if ((number != H5T_FLOAT && number != H5T_INTEGER) || H5Sget_simple_extent_npoints(space) != 1)
+        throw Error("{}", failed);
     double value = 0;
     check(H5Aread(attribute, H5T_NATIVE_DOUBLE, &value), failed);
     if (!(std::isfinite(value) && value > 0)) throw Error("{}, found {:g}", failed, value);
@@ -299,9 +322,9 @@ std::vector<T> read_array(hid_t group, const std::string& name, hid_t memory, co
     check_storage(set, type, shape, fmt::format("{}/{}", where, name));
     std::size_t count = 1;
     for (const hsize_t n : shape) count *= n;
-    // What a file declares it must also hold: a damaged one cannot make us allocate beyond 1000 times its size.
+    // What a file declares it must also hold: a damaged one cannot make us allocate more than its bytes can expand to.
     const hsize_t stored = H5Dget_storage_size(set);
-    if (count * sizeof(T) > 1000 * stored + 4096)
+    if (count * sizeof(T) > most_expansion * stored + 4096)
         throw Error("{}/{}: expected data, found {} bytes for shape {}", where, name, stored, shape_text(shape));
     std::vector<T> values(count);
     check(H5Dread(set, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()),
@@ -312,18 +335,18 @@ std::vector<T> read_array(hid_t group, const std::string& name, hid_t memory, co
     return values;
 }
 
-Table read_table(hid_t file, const std::string& name, const std::string& path) {
-    const std::string where = fmt::format("{}: /{}", path, name);
-    const Handle group(H5Gopen2(file, name.c_str(), H5P_DEFAULT), H5Gclose, where + ": cannot be read");
+Table read_table(hid_t file, TableId id, const std::string& path) {
+    const std::string where = fmt::format("{}: /{}", path, name_of(id));
+    const Handle group(H5Gopen2(file, name_of(id), H5P_DEFAULT), H5Gclose, where + ": cannot be read");
     Table table;
-    table.name = name;
+    table.id = id;
     table.method = read_text(group, "method", where);
     table.seed = read_whole(group, "seed", where);
     table.paths = read_whole(group, "paths", where);
     table.target_error = read_optional(group, "target_error", where);
     table.time_budget = read_optional(group, "time_budget", where);
     std::vector<const char*> names = {"sigma", "g"};
-    if (name == "azimuthal") {
+    if (id == TableId::azimuthal) {
         if (H5Lexists(group, "absorption", H5P_DEFAULT) > 0) names.push_back("absorption");
         names.insert(names.end(), {"h", "phi"});
     } else {
@@ -337,7 +360,7 @@ Table read_table(hid_t file, const std::string& name, const std::string& path) {
         shape.push_back(table.axes.back().size());
         cells_and_bins *= static_cast<double>(shape.back());
     }
-    if (name == "longitudinal" && table.axes[3].values != std::vector<double>{0, 1})
+    if (id == TableId::longitudinal && table.axes[3].values != std::vector<double>{0, 1})
         throw Error("{}/side: expected the values 0 and 1", where);
     if (cells_and_bins > 4e9) throw Error("{}/lobe: expected at most 4e9 values, found {:g}", where, cells_and_bins);
     const std::vector<hsize_t> cells(shape.begin(), shape.end() - 1);
@@ -352,14 +375,17 @@ Table read_table(hid_t file, const std::string& name, const std::string& path) {
 
 }  // namespace
 
-void write_tables(const std::string& path, const Tables& tables, Compression compression,
-                  const std::string& temporary) {
+void write_tables(const std::string& path, const Tables& tables, Compression compression) {
+    write_tables(Output(path), tables, compression);
+}
+
+void write_tables(const Output& output, const Tables& tables, Compression compression, const std::string& temporary) {
+    const std::string& path = output.path();
     quiet();
     register_zstd_filter();
     // Nothing is written that would be refused when it is read.
-    for (const Table* table : tables.present()) check_cells(*table, fmt::format("{}: /{}", path, table->name));
+    for (const Table* table : tables.present()) check_cells(*table, fmt::format("{}: /{}", path, table->name()));
     // The file is made in memory and written by us: HDF5 closes a file on a full disk without a word.
-    PendingFile pending(path, temporary);
     Image image;
     {
         const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, path + ": HDF5 gives no property list");
@@ -367,7 +393,7 @@ void write_tables(const std::string& path, const Tables& tables, Compression com
         check(H5Pset_fapl_core(access, image_step, false), path + ": HDF5 has no files in memory");
         image.capture(access, path);
         const Handle create = untracked(H5P_FILE_CREATE, path);
-        const Handle file(H5Fcreate(pending.temporary().c_str(), H5F_ACC_TRUNC, create, access), H5Fclose,
+        const Handle file(H5Fcreate(temporary_name(path).c_str(), H5F_ACC_TRUNC, create, access), H5Fclose,
                           path + ": cannot be written");
         write_attribute(file, "format", format_name, path);
         write_attribute(file, "format_version", format_version, path);
@@ -380,11 +406,12 @@ void write_tables(const std::string& path, const Tables& tables, Compression com
         image.size = size > 0 ? static_cast<std::size_t>(size) : 0;
     }
     if (!image.bytes || image.size == 0) throw Error("{}: HDF5 gives no file", path);
-    pending.write(image.bytes, image.size);
-    pending.commit();
+    output.write(image.bytes, image.size, temporary);
 }
 
 bool is_hdf5(const std::string& path) {
+    struct stat info = {};
+    if (::stat(path.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) return false;
     std::ifstream file(path, std::ios::binary);
     char signature[8] = {};
     file.read(signature, sizeof signature);
@@ -395,10 +422,16 @@ Tables read_tables(const std::string& path) {
     quiet();
     register_zstd_filter();
     if (!is_hdf5(path)) {
-        (void)read_file(path);  // says why, if it cannot be read at all
+        require_readable(path);
         throw Error("{}: expected a tables file (HDF5), found something else", path);
     }
-    const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, path + ": damaged HDF5 file");
+    const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, path + ": HDF5 gives no property list");
+#if H5_VERSION_GE(1, 10, 7)
+    // Without a lock, which some file systems have not (ENOLCK, ENOSYS): our files appear whole under their names, and
+    // SHA-256 tells if somebody writes into one.
+    check(H5Pset_file_locking(access, false, true), path + ": HDF5 gives no property list");
+#endif
+    const Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access), H5Fclose, path + ": damaged HDF5 file");
     if (read_text(file, "format", path) != format_name)
         throw Error("{}: expected format '{}', found '{}'", path, format_name, read_text(file, "format", path));
     const std::uint64_t version = read_whole(file, "format_version", path);
@@ -406,8 +439,8 @@ Tables read_tables(const std::string& path) {
         throw Error("{}: expected format version 1 to {}, found {}", path, format_version, version);
     Tables tables;
     tables.program = read_text(file, "program", path);
-    if (H5Lexists(file, "azimuthal", H5P_DEFAULT) > 0) tables.azimuthal = read_table(file, "azimuthal", path);
-    if (H5Lexists(file, "longitudinal", H5P_DEFAULT) > 0) tables.longitudinal = read_table(file, "longitudinal", path);
+    for (const TableId id : table_ids)
+        if (H5Lexists(file, name_of(id), H5P_DEFAULT) > 0) tables[id] = read_table(file, id, path);
     if (tables.present().empty()) throw Error("{}: expected /azimuthal or /longitudinal, found neither", path);
     if (version >= first_with_hash) {
         const std::string expected = read_text(file, "sha256", path), found = hex(contents_hash(tables));

@@ -7,12 +7,13 @@
 #include <memory>
 
 #include "tables/error.hpp"
+#include "tables/store/slices.hpp"
 
 namespace medulla::tables {
 namespace {
 
-// A chunk is one (sigma, g) slice; the greatest legal one is 4096 x 4096 floats (axis.cpp's node limit).
-constexpr unsigned long long greatest_chunk = 4096ull * 4096ull * 4ull;
+// A chunk is one (sigma, g) slice of floats.
+constexpr unsigned long long greatest_chunk = most_slice_values * sizeof(float);
 
 struct ContextDeleter {
     void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }

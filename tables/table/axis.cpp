@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "sim2d/elementary.hpp"
@@ -13,7 +14,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::max();
 
-// g = +-1 is no distribution; |g| <= 0.999 is what the solvers answer for.
+// g = +-1 is no distribution; the solvers are tested for |g| <= 0.999.
 constexpr std::array<AxisRule, 8> rules = {{
     {"sigma", "1", "optical radius of scattering", 0, infinity, false},
     {"g", "1", "mean cosine of the phase function", -0.999, 0.999, false},
@@ -68,23 +69,9 @@ Quantity quantity_of(const std::string& name) {
 }
 
 const char* name_of(Quantity quantity) {
-    switch (quantity) {
-        case Quantity::sigma:
-            return "sigma";
-        case Quantity::g:
-            return "g";
-        case Quantity::absorption:
-            return "absorption";
-        case Quantity::h:
-            return "h";
-        case Quantity::theta_i:
-            return "theta_i";
-        case Quantity::phi:
-            return "phi";
-        case Quantity::theta_r:
-            return "theta_r";
-    }
-    return "?";
+    constexpr const char* names[] = {"sigma", "g", "absorption", "h", "theta_i", "phi", "theta_r"};
+    static_assert(std::size(names) == quantity_count);
+    return names[static_cast<std::size_t>(quantity)];
 }
 
 Axis exit_axis(const std::string& name, std::size_t bins) {
@@ -131,7 +118,7 @@ Axis graded_axis(const std::string& name, const Range& range) {
     for (std::size_t i = 0; i + 1 < range.count; ++i) {
         const double u = static_cast<double>(i) / static_cast<double>(range.count - 1);
         double t = u;
-        // Of square roots and quotients: the same nodes on every processor.
+        // Square roots and quotients only: the same nodes on every processor.
         const double rest = 1 - u, root = std::sqrt(rest);
         if (name == "sigma" || name == "absorption") t = u * u * std::sqrt(u);
         if (name == "g") t = 1 - rest * root;

@@ -3,15 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
-#include "medulla/lookup.hpp"
+#include "sim2d/disc/single.hpp"
+#include "sim2d/slab/single.hpp"
 #include "tables/error.hpp"
 
 namespace medulla::tables {
 
+const char* name_of(TableId table) { return table == TableId::azimuthal ? "azimuthal" : "longitudinal"; }
+
 const Axis& Table::axis(const std::string& axis_name) const {
     for (const Axis& a : axes)
         if (a.name == axis_name) return a;
-    throw Error("table {}: no axis {}", name, axis_name);
+    throw Error("table {}: no axis {}", name(), axis_name);
 }
 
 bool Table::has_axis(const std::string& axis_name) const {
@@ -51,7 +54,7 @@ double Table::parameter(std::size_t cell, const std::string& axis_name) const {
     const std::vector<std::size_t> index = position(cell);
     for (std::size_t k = 0; k < index.size(); ++k)
         if (axes[k].name == axis_name) return axes[k].values[index[k]];
-    throw Error("table {}: no axis {}", name, axis_name);
+    throw Error("table {}: no axis {}", name(), axis_name);
 }
 
 void Table::allocate() {
@@ -60,28 +63,36 @@ void Table::allocate() {
     for (auto* array : {&energy, &energy_error, &standard_error, &mean_length}) array->assign(n, 0.0);
 }
 
+Table& Tables::at(TableId id) {
+    std::optional<Table>& table = (*this)[id];
+    if (!table) throw Error("there is no {} table", name_of(id));
+    return *table;
+}
+
+const Table& Tables::at(TableId id) const { return const_cast<Tables&>(*this).at(id); }
+
 std::vector<const Table*> Tables::present() const {
     std::vector<const Table*> list;
-    if (azimuthal) list.push_back(&*azimuthal);
-    if (longitudinal) list.push_back(&*longitudinal);
+    for (const TableId id : table_ids)
+        if (const std::optional<Table>& table = (*this)[id]) list.push_back(&*table);
     return list;
 }
 
 std::optional<double> closed_form_energy(const Table& table, std::size_t cell) {
-    if (table.name == "longitudinal")
-        return longitudinal_energy(table.parameter(cell, "sigma"), table.parameter(cell, "theta_i"));
+    if (table.id == TableId::longitudinal)
+        return sim2d::slab_energy(table.parameter(cell, "sigma"), table.parameter(cell, "theta_i"));
     if (table.has_axis("absorption") && table.parameter(cell, "absorption") > 0) return std::nullopt;
-    return azimuthal_energy(table.parameter(cell, "sigma"), table.parameter(cell, "h"));
+    return sim2d::disc_energy(table.parameter(cell, "sigma"), table.parameter(cell, "h"));
 }
 
 namespace {
 
-/// Energy of a cell that absorbs: no more than its first collisions leave unabsorbed, no more than at the absorption
-/// before.
+/// Energy of a cell with absorption: at most that of its unabsorbed first collisions, and at most that at the next
+/// lower absorption.
 template <class Fail>
 void check_absorbed(const Table& table, std::size_t cell, const Fail& fail) {
     const double sigma = table.parameter(cell, "sigma"), a = table.parameter(cell, "absorption"),
-                 most = sigma / (sigma + a) * azimuthal_energy(sigma + a, table.parameter(cell, "h"));
+                 most = sigma / (sigma + a) * sim2d::disc_energy(sigma + a, table.parameter(cell, "h"));
     const double energy = table.energy[cell], error = table.energy_error[cell];
     if (!(energy <= most + 5 * error + 1e-12))
         fail(fmt::format("expected an energy of at most {:.9g}, found {:.9g} with standard error {:.2e}", most, energy,
@@ -98,7 +109,7 @@ void check_absorbed(const Table& table, std::size_t cell, const Fail& fail) {
 }  // namespace
 
 void check_cells(const Table& table, const std::string& where) {
-    const std::size_t sides = table.name == "longitudinal" ? 2 : 1;
+    const std::size_t sides = table.sides();
     const double width = bin_width(table.exit());
     for (std::size_t cell = 0; cell < table.cells(); ++cell) {
         const auto fail = [&](const std::string& what) {
@@ -110,7 +121,7 @@ void check_cells(const Table& table, const std::string& where) {
             if (!(value >= 0)) fail(fmt::format("expected a density >= 0, found {:g}", value));
             sum += value * width;
         }
-        // Sums of float values: each is rounded by 2^-24 relative.
+        // A sum of floats, each with a relative rounding of 2^-24.
         if (!(std::abs(sum - 1) <= 1e-6)) fail(fmt::format("expected a lobe of integral 1, found {:.9g}", sum));
         for (const auto* array : {&table.energy, &table.energy_error, &table.standard_error, &table.mean_length})
             if (!((*array)[cell] >= 0))
@@ -145,11 +156,12 @@ double extrapolate(const std::vector<double>& x, const std::vector<double>& y, d
 
 namespace {
 
-/// Mean over the interval of the exponential through its ends' values; of a line where one is 0 (a few analog paths).
+/// Mean over an interval of the exponential through the values at its ends; of the line where one is 0 (few analog
+/// paths).
 double logarithmic_mean(double a, double b) {
     if (!(a > 0 && b > 0)) return (a + b) / 2;
     const double ratio = std::log(b / a);
-    return std::abs(ratio) > 1e-4 ? (b - a) / ratio : (a + b) / 2;  // equal to ratio^2 / 12
+    return std::abs(ratio) > 1e-4 ? (b - a) / ratio : (a + b) / 2;  // relative error ratio^2 / 12
 }
 
 }  // namespace
@@ -159,17 +171,18 @@ std::vector<double> survival_lengths(const Table& table) {
     std::vector<double> lengths = table.mean_length;
     const std::vector<double>&sigma = table.axis("sigma").values, &absorption = table.axis("absorption").values,
           &h = table.axis("h").values;
-    const auto unknown = [&](double s, double offset) { return !(azimuthal_energy(s, offset) > 0); };
+    const auto unknown = [&](double s, double offset) { return !(sim2d::disc_energy(s, offset) > 0); };
     for (std::size_t cell = 0; cell < table.cells(); ++cell) {
         const double a = table.parameter(cell, "absorption"), s = table.parameter(cell, "sigma"),
                      offset = table.parameter(cell, "h");
         if (a == 0 || unknown(s, offset)) continue;
-        const double left = table.energy[cell] / azimuthal_energy(s, offset);
-        if (!(left > 0)) throw Error("table {}: {}: expected an energy > 0", table.name, table.describe(cell));
+        const double left = table.energy[cell] / sim2d::disc_energy(s, offset);
+        if (!(left > 0)) throw Error("table {}: {}: expected an energy > 0", table.name(), table.describe(cell));
         lengths[cell] = -std::log(left) / a;
     }
-    // a l is the integral of the mean length over the absorption. By logarithmic means between the nodes it is a few
-    // percent off, and just so where it is known: the ratio of up to three neighbours, `step` cells apart, mends it.
+    // a l is the integral of the mean length over the absorption. Logarithmic means between nodes have errors of a few
+    // percent, which are about the same in neighbours where l is known: the ratios of up to three neighbours, `step`
+    // cells apart, are extrapolated and correct it.
     const std::size_t along = h.size(), row = table.cells() / sigma.size();
     const auto integrals = [&](std::size_t cell) {  // `cell` has the least absorption
         std::vector<double> sums{absorption[0] * table.mean_length[cell]};
@@ -195,7 +208,7 @@ std::vector<double> survival_lengths(const Table& table) {
     for (std::size_t i = h.size() - 1; i-- > 0 && half_chords.size() < 3;)
         half_chords.push_back(std::sqrt((1 - h[i]) * (1 + h[i])));
     for (std::size_t i = 1; i < sigma.size() && thin.size() < 3; ++i) thin.push_back(sigma[i]);
-    for (const bool rim : {true, false})  // the rim first, so that sigma = 0 has neighbours there
+    for (const bool rim : {true, false})  // h = 1 first, so that sigma = 0 has neighbours there
         for (std::size_t cell = 0; cell < table.cells(); ++cell) {
             const double s = table.parameter(cell, "sigma"), offset = table.parameter(cell, "h");
             if (table.parameter(cell, "absorption") != absorption[0]) continue;
@@ -206,7 +219,7 @@ std::vector<double> survival_lengths(const Table& table) {
 }
 
 std::vector<double> side_lobes(const Table& table, std::size_t side) {
-    const std::size_t bins = table.bins(), sides = table.name == "longitudinal" ? 2 : 1;
+    const std::size_t bins = table.bins(), sides = table.sides();
     const std::size_t n = table.cells() / sides;
     std::vector<double> values(n * bins);
     for (std::size_t c = 0; c < n; ++c) {

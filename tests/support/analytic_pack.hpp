@@ -1,6 +1,5 @@
-// A small valid pack made in memory from closed forms, so that the BCSDF is tested without a simulation: factors are
-// interpolated by the runtime's own splines. Rests on pack.hpp's layout; the lobes are made up but behave like real
-// ones.
+// A small valid pack in memory from closed forms, so that the BCSDF is tested without a simulation: factors are
+// interpolated by the runtime's splines. The lobes are invented, but have the properties of real ones.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +27,7 @@ struct AxisSpec {
 
 struct TableSpec {
     TableKind kind;
-    int rank, even;  ///< all components, and how many of them, the first, are even in the exit direction
+    int rank, even;  ///< number of components; the first `even` are even in the exit direction
     std::vector<AxisSpec> axes;
 };
 
@@ -192,7 +191,7 @@ class PackBuilder {
 };
 
 /// Azimuthal: sum over harmonics n of g^n exp(-0.1 sigma n) cos(n phi), the planar HG as sigma -> 0, leaning by
-/// 0.4 h (g^2 - 1) sin(phi): no symmetry is left that a wrong sign could hide behind. Rank `harmonics` + 1.
+/// 0.4 h (g^2 - 1) sin(phi): without any symmetry that would hide a wrong sign. Rank `harmonics` + 1.
 inline double azimuthal_density(double sigma, double g, double h, double phi, int harmonics) {
     double sum = 1;
     for (int n = 1; n < harmonics; ++n) sum += 2 * std::pow(g, n) * std::exp(-0.1 * sigma * n) * std::cos(n * phi);
@@ -233,7 +232,7 @@ inline TableSpec longitudinal_table(bool back, int rank = 2) {
     return spec;
 }
 
-/// The pack most tests use; its bytes live as long as the object.
+/// The pack of most tests; it owns its bytes.
 struct AnalyticPack {
     std::vector<unsigned char> bytes;
     PackView view;
@@ -245,7 +244,7 @@ struct AnalyticPack {
             builder.add(longitudinal_table(true, longitudinal_rank)),
                 builder.add(longitudinal_table(false, longitudinal_rank));
         bytes = builder.bytes();
-        // Any other pack by hand: the properties that tests state do not depend on it.
+        // To run the tests with another pack: the tested properties do not depend on it.
         if (const char* file = std::getenv("MEDULLA_TEST_PACK")) {
             std::ifstream in(file, std::ios::binary);
             bytes.assign(std::istreambuf_iterator<char>(in), {});

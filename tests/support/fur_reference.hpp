@@ -1,5 +1,5 @@
-// The slow plain twin of the BCSDF: double precision, standard library, straight from docs/bcsdf.md's formulas, no
-// shortcut shared with the runtime but the tables' lookup (contract + lobe).
+// Reference implementation of the BCSDF: double precision, standard library, directly from the formulas of
+// docs/bcsdf.md. It shares nothing with the runtime except table lookups (contract + lobe).
 #pragma once
 
 #include <algorithm>
@@ -16,8 +16,8 @@ struct Lobes {
     double M[lobe_count] = {}, N[lobe_count][3] = {};
 };
 
-/// Unpolarised sums as printed: R + (1-R)^2 R / (1-R^2), averaged over both polarisations of an interface of `index`
-/// met at the angle gamma_i.
+/// Unpolarised sums as printed: R + (1-R)^2 R / (1-R^2), averaged over both polarisations, for an interface of
+/// `index` at the angle of incidence gamma_i.
 inline double cuticle_reflectance(double index, double gamma_i, double layers) {
     const double ci = std::cos(gamma_i), ct = std::sqrt(1 - std::pow(std::sin(gamma_i) / index, 2));
     double F1 = 0;
@@ -60,7 +60,7 @@ inline Lobes near_lobes(const FurParameters<3>& p, const PackView& pack, double 
         l.M[k] = truncated(theta_r, -theta_i + shift[k] * double(p.alpha), rough[k] * double(p.beta_m));
     const double ms = double(p.sigma_ms), ma = double(p.sigma_ma);
     const bool scattered = with_scattered && std::abs(inside) < kappa && ms > 0;
-    const bool tabled = absorbs(pack);  // the tables know what the medulla absorbs; else T_b has it
+    const bool tabled = absorbs(pack);  // the tables include absorption in the medulla; else T_b does
     double C[3] = {}, M = 0;
     if (scattered) {
         const float sigma = float(ms * kappa / cos_t), side = h < 0 ? -1.0f : 1.0f;

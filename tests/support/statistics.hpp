@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "medulla/config.hpp"
+
 namespace medulla::test {
 
 /// Probability that a chi-squared variable of `freedom` degrees exceeds x (Wilson-Hilferty: 1e-3 accurate from 10 on).
@@ -34,10 +36,10 @@ inline double student_p(double t, int freedom) {
     const double theta = std::atan(std::abs(t) / std::sqrt(double(freedom))), c = std::cos(theta);
     double sum = 0, term = c;
     for (int k = 3; k <= freedom; term *= (k - 1.0) / k * c * c, k += 2) sum += term;
-    return 1 - 2 / 3.14159265358979323846 * (theta + std::sin(theta) * sum);
+    return 1 - 2 / pi * (theta + std::sin(theta) * sum);
 }
 
-/// p-value of p-values that are even in (0, 1), by `classes` classes.
+/// p-value of p-values that are uniform in (0, 1), over `classes` classes.
 inline double evenness_p(const std::vector<double>& p, std::size_t classes) {
     std::vector<double> counts(classes, 0.0);
     for (const double x : p) counts[std::min(classes - 1, static_cast<std::size_t>(x * double(classes)))] += 1;

@@ -4,7 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 
+#ifndef MEDULLA_PACK_default_pack_fc5f0c33ce206d6f
+#define MEDULLA_PACK_default_pack_fc5f0c33ce206d6f
+
 namespace medulla {
+inline namespace pack_fc5f0c33ce206d6f {
 
 inline constexpr std::size_t default_pack_size = 153593;
 // clang-format off
@@ -2412,4 +2416,7 @@ alignas(16) inline constexpr std::uint64_t default_pack_words[19200] = {
 };
 // clang-format on
 
+}  // namespace pack_fc5f0c33ce206d6f
 }  // namespace medulla
+
+#endif

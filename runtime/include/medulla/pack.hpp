@@ -20,6 +20,10 @@ inline constexpr std::uint32_t max_spans = 4096;
 /// integral that lookup.hpp divides by, 1e-30, that is a finite float: no pack makes an infinity or a NaN. The pack
 /// built in reaches 1540.
 inline constexpr float most_reach = 1e7f;
+/// Neighbouring knots are at least this far apart, and none is further from 0 than most_knot: then every difference of
+/// knots, its reciprocal and 64 over an axis's length (AxisIndex) are normal floats, which compilers and processors
+/// that flush denormals or assume finite numbers treat alike. Square roots of sigma are 2^-75 to 2^64.
+inline constexpr float least_span = 0x1p-100f, most_knot = 0x1p100f;
 inline constexpr std::uint32_t rank_multiple = 8;  ///< rows are padded with zeros to a multiple of this rank
 
 MEDULLA_FN constexpr std::uint32_t padded_rank(std::uint32_t rank) noexcept {
@@ -172,7 +176,9 @@ enum class PackStatus {
     bad_axis,
     bad_knots,
     bad_number,
+    bad_reserved,
     out_of_bounds,
+    big_endian,
 };
 
 inline const char* describe(PackStatus status) noexcept {
@@ -196,11 +202,15 @@ inline const char* describe(PackStatus status) noexcept {
         case PackStatus::bad_axis:
             return "a table's axes are not those of its kind";
         case PackStatus::bad_knots:
-            return "an axis's knots do not increase, or do not span its range";
+            return "an axis's knots do not increase, lie too close together or too far apart, or do not span its range";
         case PackStatus::bad_number:
-            return "a scale or integral is not finite, or its lobes could exceed any density";
+            return "a scale or integral is not finite, or larger than that of any density";
+        case PackStatus::bad_reserved:
+            return "a field that this format version leaves at 0 is not 0";
         case PackStatus::out_of_bounds:
             return "an offset points outside the pack";
+        case PackStatus::big_endian:
+            return "packs are little-endian; this machine is not";
     }
     return "unknown status";
 }
@@ -219,7 +229,26 @@ MEDULLA_FN T load(const unsigned char* bytes) noexcept {
     return value;
 }
 
-MEDULLA_FN bool finite(float x) noexcept { return x - x == 0.0f; }
+/// Whether the `count` floats there are neither infinite nor NaN, by their bits: with -ffast-math a compiler may take
+/// every float for finite, those passed to or returned by a function included, and leave out the test.
+MEDULLA_FN bool finite(const void* floats, std::uint32_t count) noexcept {
+    for (std::uint32_t i = 0; i < count; ++i)
+        if ((load<std::uint32_t>(static_cast<const unsigned char*>(floats) + 4 * i) & 0x7f800000u) == 0x7f800000u)
+            return false;
+    return true;
+}
+
+/// Whether the words there are all 0.
+MEDULLA_FN bool zeros(const std::uint32_t* words, std::uint32_t count) noexcept {
+    for (std::uint32_t i = 0; i < count; ++i)
+        if (words[i] != 0) return false;
+    return true;
+}
+
+MEDULLA_FN bool little_endian() noexcept {
+    const std::uint32_t one = 1;
+    return *reinterpret_cast<const unsigned char*>(&one) == 1;
+}
 
 MEDULLA_FN bool inside(std::uint64_t offset, std::uint64_t bytes, std::uint64_t total) noexcept {
     return offset >= sizeof(PackHeader) && offset <= total && bytes <= total - offset;
@@ -250,12 +279,13 @@ MEDULLA_FN bool axes_fit(const PackTable& table) noexcept {
 }
 
 MEDULLA_FN PackStatus check_knots(const AxisView<float>& axis) noexcept {
+    if (!finite(axis.knots, std::uint32_t(sizeof(Knot<float>) / 4) * (axis.spans + 1 + 2 * ghost_knots)))
+        return PackStatus::bad_knots;
     const auto last = std::int32_t(axis.spans + ghost_knots);
     for (std::int32_t i = -std::int32_t(ghost_knots); i <= last; ++i) {
         const Knot<float> k = axis.knot(i);
-        if (!finite(k.t) || !finite(k.inverse1) || !finite(k.inverse2) || !finite(k.inverse3))
-            return PackStatus::bad_knots;
-        if (i < last && !(k.t < axis.knot(i + 1).t)) return PackStatus::bad_knots;
+        if (!(std::abs(k.t) <= most_knot)) return PackStatus::bad_knots;
+        if (i < last && !(axis.knot(i + 1).t - k.t >= least_span)) return PackStatus::bad_knots;
         // The reciprocals are stored, so they are checked: 1e-4 covers the rounding of differences of close knots.
         const float inverse[3] = {k.inverse1, k.inverse2, k.inverse3};
         for (std::int32_t step = 1; step <= 3 && i + step <= last; ++step) {
@@ -289,7 +319,9 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
     if (table.row_bytes != row_bytes) return PackStatus::bad_table;
     if (table.axis_count < 1 || table.axis_count > max_axes) return PackStatus::bad_table;
     if (!axes_fit(table)) return PackStatus::bad_axis;
-    if (!finite(table.low) || !finite(table.high)) return PackStatus::bad_number;
+    if (!finite(&table.low, 1) || !finite(&table.high, 1)) return PackStatus::bad_number;
+    for (std::uint32_t k = 0; k < max_axes; ++k)
+        if (!zeros(table.axes[k].reserved, 3)) return PackStatus::bad_reserved;
     for (std::uint32_t k = 0; k < table.axis_count; ++k) {
         const PackAxis& axis = table.axes[k];
         const std::uint64_t knot_bytes = std::uint64_t(axis.spans + 1 + 2 * ghost_knots) * sizeof(Knot<float>);
@@ -302,19 +334,22 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
         if (!half_circle(view.axis(k), quantity)) return PackStatus::bad_knots;
     }
     // Odd components have no integral.
-    const std::uint32_t offsets[2] = {table.scales_offset, table.integrals_offset},
-                        counts[2] = {table.rank_stride, view.even_stride()};
-    float sum[2] = {0, 0};
-    for (std::uint32_t i = 0; i < (view.has_exit() ? 2u : 1u); ++i) {
-        if (!inside(offsets[i], std::uint64_t(counts[i]) * 4, total)) return PackStatus::out_of_bounds;
-        for (std::uint32_t r = 0; r < counts[i]; ++r) {
-            const float value = load<float>(view.bytes + offsets[i] + 4 * r);
-            if (!finite(value)) return PackStatus::bad_number;
-            sum[i] += std::abs(value);
-        }
-    }
-    for (std::uint32_t k = 0; k < table.axis_count; ++k) sum[0] *= float(greatest_number);
-    return sum[0] <= most_reach ? PackStatus::ok : PackStatus::bad_number;
+    const std::uint32_t integrals = view.has_exit() ? view.even_stride() : 0;
+    if (!inside(table.scales_offset, std::uint64_t(table.rank_stride) * 4, total) ||
+        (view.has_exit() && !inside(table.integrals_offset, std::uint64_t(integrals) * 4, total)))
+        return PackStatus::out_of_bounds;
+    const unsigned char *scale = view.bytes + table.scales_offset, *integral = view.bytes + table.integrals_offset;
+    if (!finite(scale, table.rank_stride) || !finite(integral, integrals)) return PackStatus::bad_number;
+    double reach = 0;  // double: 512 floats times 32767^6 are finite
+    for (std::uint32_t r = 0; r < table.rank_stride; ++r) reach += std::abs(double(load<float>(scale + 4 * r)));
+    for (std::uint32_t k = 0; k < table.axis_count; ++k) reach *= greatest_number;
+    if (!(reach <= double(most_reach))) return PackStatus::bad_number;
+    // Both halves of the axis, of coefficients of at most greatest_number each; 1e-5 is the rounding of knots.
+    const AxisView<float> exit = view.axis(view.parameter_axes());
+    const double most = integrals > 0 ? 2 * greatest_number * double(exit.upper()) * (1 + 1e-5) : 0;
+    for (std::uint32_t r = 0; r < integrals; ++r)
+        if (!(std::abs(double(load<float>(integral + 4 * r))) <= most)) return PackStatus::bad_number;
+    return PackStatus::ok;
 }
 
 }  // namespace detail
@@ -335,12 +370,14 @@ inline OpenResult open_pack(const void* data, std::size_t size) noexcept {
     const auto fail = [&](PackStatus status) { return OpenResult{PackView{}, status}; };
     if (data == nullptr) return result;
     const auto* bytes = static_cast<const unsigned char*>(data);
+    if (!detail::little_endian()) return fail(PackStatus::big_endian);
     if (size < sizeof(PackHeader)) return fail(PackStatus::too_short);
     const auto header = detail::load<PackHeader>(bytes);
     if (std::memcmp(header.magic, pack_magic, sizeof pack_magic) != 0) return fail(PackStatus::not_a_pack);
     if (header.version != pack_version) return fail(PackStatus::other_version);
     if (header.byte_count != size) return fail(PackStatus::wrong_size);
     if (header.checksum != pack_checksum(bytes, size)) return fail(PackStatus::wrong_checksum);
+    if (!detail::zeros(header.reserved, 5)) return fail(PackStatus::bad_reserved);
     if (header.table_count > table_kinds) return fail(PackStatus::bad_table);
     if (!detail::inside(header.tables_offset, std::uint64_t(header.table_count) * sizeof(PackTable), size) ||
         !detail::inside(header.text_offset, header.text_bytes, size))

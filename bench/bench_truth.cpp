@@ -1,0 +1,144 @@
+// The published model of ten animals against light in the whole fibre: docs/truth.md. Energies by class, and how far
+// the scattered light's shape is from the model's, with the causes apart and the noise beside them.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "bench/published_model.hpp"
+#include "sim3d/fibre_tracer.hpp"
+
+using namespace medulla;
+using namespace medulla::sim3d;
+using bench::Longitudinal;
+
+namespace {
+
+/// The same over phi alone, or theta_r alone, as a density of one row or column.
+DirectionalDensity marginal(const DirectionalDensity& d, bool over_phi) {
+    DirectionalDensity m;
+    m.theta_bins = over_phi ? 1 : d.theta_bins, m.phi_bins = over_phi ? d.phi_bins : 1;
+    m.value.assign(m.theta_bins * m.phi_bins, 0.0);
+    for (std::size_t i = 0; i < d.value.size(); ++i) m.value[over_phi ? i % d.phi_bins : i / d.phi_bins] += d.value[i];
+    return m;
+}
+
+DirectionalDensity product_of_marginals(const DirectionalDensity& d) {
+    const DirectionalDensity phi = marginal(d, true), theta = marginal(d, false);
+    DirectionalDensity p = d;
+    for (std::size_t i = 0; i < p.value.size(); ++i)
+        p.value[i] = theta.value[i / d.phi_bins] * phi.value[i % d.phi_bins];
+    return p;
+}
+
+/// |a - b| / |b| of densities as they are.
+double relative_distance(const DirectionalDensity& a, const DirectionalDensity& b) {
+    double d = 0, n = 0;
+    for (std::size_t i = 0; i < b.value.size(); ++i)
+        d += (a.value[i] - b.value[i]) * (a.value[i] - b.value[i]), n += b.value[i] * b.value[i];
+    return std::sqrt(d / n);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    FibreOptions options;
+    options.paths = 4000000, options.theta_bins = 60, options.phi_bins = 96;
+    double theta_i = -40;
+    std::optional<double> h;
+    bool smooth = false;
+    std::string json;
+    std::vector<std::string> animals;
+    CLI::App app("The published model against light in the whole fibre");
+    app.add_option("--paths", options.paths, "paths per animal");
+    app.add_option("--seed", options.seed);
+    app.add_option("--theta-i", theta_i, "inclination of the light [degrees]");
+    app.add_option("--offset", h, "one ray, of this h; without: the far field");
+    app.add_flag("--smooth", smooth, "leave out the cuticle's tilt and roughness");
+    app.add_option("--animal", animals, "these alone");
+    app.add_option("--theta-bins", options.theta_bins);
+    app.add_option("--phi-bins", options.phi_bins);
+    app.add_option("--json", json, "write the numbers to FILE");
+    CLI11_PARSE(app, argc, argv);
+
+    Light light;
+    light.theta_i = theta_i * pi / 180;
+    if (h) light.h_low = light.h_high = *h;
+    nlohmann::json out;
+    std::printf("theta_i = %g degrees, %s, %s cuticle, %.3g paths an animal, bins of %.3g x %.3g degrees\n", theta_i,
+                h ? "one ray" : "far field", smooth ? "smooth" : "rough", double(options.paths),
+                180.0 / double(options.theta_bins), 360.0 / double(options.phi_bins));
+    std::printf(
+        "Energies of R, TT, TRT and higher, s, Rs, sR in three dimensions (error in units of 1e-4) | of the "
+        "model's R, TT, TRT, TTs, TRTs | scattered light without absorption: 3D (1e-3), model\n");
+    std::printf(
+        "Total variation of the scattered shape: published, at the authors' sigma, with the cosine, with the cosine "
+        "at the authors' sigma | with the cosine: over phi, over theta_r | of the product of its own marginals | "
+        "noise | relative L2 of the scattered lobe: published, its shape, with the cosine\n");
+    for (const FurPreset& preset : fur_presets) {
+        if (!animals.empty() && std::find(animals.begin(), animals.end(), preset.name) == animals.end()) continue;
+        Fibre fibre = bench::fibre_of(preset);
+        if (smooth) fibre.alpha = fibre.beta_m = fibre.beta_n = 0;
+        const FibreProfile truth = trace_fibre(fibre, light, options);
+        const bench::PublishedModel model =
+            bench::published_model(fibre, light.theta_i, h, options.theta_bins, options.phi_bins);
+        Fibre white = fibre;
+        white.sigma_ca = {0}, white.sigma_ma = 0;
+        FibreOptions fewer = options;
+        fewer.paths = options.paths / 4 + 1;
+        const Estimate white_truth = trace_fibre(white, light, fewer).energy(scattered);
+        const bench::PublishedModel white_model = bench::published_model(white, light.theta_i, h, 1, 1);
+        const double white_energy = white_model.energy[3] + white_model.energy[4];
+
+        nlohmann::json row = {
+            {"animal", preset.name}, {"white_scattered", white_truth.value}, {"white_model", white_energy}};
+        std::printf("%-9s |", preset.name);
+        const Classes sets[] = {only(Class::R),
+                                only(Class::TT),
+                                only(Class::TRT) | only(Class::higher),
+                                only(Class::scattered),
+                                only(Class::reflected_scattered),
+                                only(Class::scattered_reflected)};
+        for (const Classes set : sets) {
+            const Estimate e = truth.energy(set);
+            std::printf(" %.4f(%.0f)", e.value, std::ceil(e.error * 1e4));
+            row["truth"].push_back({e.value, e.error});
+        }
+        std::printf(" |");
+        for (const double A : model.energy) std::printf(" %.3f", A), row["model"].push_back(A);
+        std::printf(" | %.3f(%.0f) %.3f\n", white_truth.value, std::ceil(white_truth.error * 1e3), white_energy);
+
+        out["animals"].push_back(row);
+        if (!(model.energy[3] > 0)) continue;  // one ray that misses the medulla
+        const DirectionalDensity lobe = truth.density(scattered, 0, !h);
+        const DirectionalDensity& published = model.scattered[int(Longitudinal::house)];
+        const DirectionalDensity& cosine = model.scattered[int(Longitudinal::house_cosine)];
+        DirectionalDensity scaled[2] = {published, cosine};
+        const double all = truth.energy(scattered).value / (model.energy[3] + model.energy[4]);
+        for (DirectionalDensity& d : scaled)
+            for (double& v : d.value) v *= all;
+        const std::vector<double> numbers = {total_variation(lobe, published),
+                                             total_variation(lobe, model.scattered[int(Longitudinal::authors)]),
+                                             total_variation(lobe, cosine),
+                                             total_variation(lobe, model.scattered[int(Longitudinal::authors_cosine)]),
+                                             total_variation(marginal(lobe, true), marginal(cosine, true)),
+                                             total_variation(marginal(lobe, false), marginal(cosine, false)),
+                                             total_variation(lobe, product_of_marginals(lobe)),
+                                             total_variation_noise(lobe),
+                                             relative_distance(published, lobe),
+                                             relative_distance(scaled[0], lobe),
+                                             relative_distance(scaled[1], lobe)};
+        out["animals"].back()["shape"] = numbers;
+        std::printf("%-9s | %.3f %.3f %.3f %.3f | %.3f %.3f | %.3f | %.3f | %.2f %.2f %.2f\n", "", numbers[0],
+                    numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8],
+                    numbers[9], numbers[10]);
+        std::fflush(stdout);
+    }
+    if (!json.empty()) std::ofstream(json) << out.dump(1) << '\n';
+}

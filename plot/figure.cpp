@@ -25,7 +25,7 @@ double round_number(double x, bool up) {
     return best * decade;
 }
 
-/// Bytes of the valid UTF-8 sequence at `at`; 0: none. (Overlong forms and surrogates are left to gnuplot.)
+/// Bytes of the valid UTF-8 sequence at `at`, 0: none (RFC 3629).
 std::size_t sequence_at(const std::string& text, std::size_t at) {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
     const unsigned char first = byte(at);
@@ -33,7 +33,11 @@ std::size_t sequence_at(const std::string& text, std::size_t at) {
     if (first > 0xf4 || at + size > text.size()) return 0;
     for (std::size_t i = at + 1; i < at + size; ++i)
         if ((byte(i) & 0xc0) != 0x80) return 0;
-    return size;
+    // Longer than necessary, a surrogate, or above the last character.
+    const unsigned char second = size > 2 ? byte(at + 1) : 0;
+    const bool wrong = (first == 0xe0 && second < 0xa0) || (first == 0xed && second >= 0xa0) ||
+                       (first == 0xf0 && second < 0x90) || (first == 0xf4 && second >= 0x90);
+    return wrong ? 0 : size;
 }
 
 }  // namespace

@@ -172,6 +172,8 @@ class Outputs(runs.WithFiles):
         self.refused("medulla-precompute", "-o", "c.h5", *SMALL, parts=["c.h5.shards", "folder"])
         os.mkdir(self.path("d.h5.shards"))
         for name in ("azimuthal-s0000-g0000.shard", "configuration.json"):
+            if os.path.exists(self.path("d.h5.shards/" + name)):  # of the run before
+                os.remove(self.path("d.h5.shards/" + name))
             os.mkfifo(self.path("d.h5.shards/" + name))
             self.refused("medulla-precompute", "-o", "d.h5", *SMALL, "--resume", parts=["d.h5.shards/" + name, "pipe"])
             self.assertTrue(stat.S_ISFIFO(os.stat(self.path("d.h5.shards/" + name)).st_mode))

@@ -244,7 +244,7 @@ TEST_CASE("A rank beyond the most of a table is reduced to it, and exact except 
         for (const TableReport& report : result.tables) {
             if (!is_lobe(report.kind)) continue;
             for (const PartReport& part : report.parts) {
-                // Factors >= 0 have spline coefficients in place of nodes, two more on each axis.
+                // Non-negative factors have spline coefficients in place of nodes, two more on each axis.
                 CHECK(part.rank <= (solver == tensor::Solver::nonnegative ? 6 * 5 * 6 : 4 * 3 * 4));
                 CHECK(part.solve.solver == "fibres");
                 if (solver != tensor::Solver::nonnegative) CHECK(part.solve.relative_error < 2e-7);

@@ -48,7 +48,7 @@ constexpr Field fields[] = {{"eta", &FurParameters<3>::eta, 1, "a value in (1, 1
 bool refused(const FurParameters<3>& fur, const Field& field) {
     FurParameters<3> alone;
     alone.*field.value = fur.*field.value;
-    return check(alone) != FurStatus::ok;
+    return out_of_range(alone) != 0;
 }
 
 /// @param pointer JSON pointer of the entry in its file, empty for the whole file
@@ -86,7 +86,7 @@ Material material_of(const json& entry, const std::string& path, const std::stri
                 fur.sigma_ca[c] = static_cast<float>(x);
                 FurParameters<3> alone;
                 alone.sigma_ca[c] = fur.sigma_ca[c];
-                if (check(alone) != FurStatus::ok) throw Error("{}: expected values in [0, 1e9], found {:g}", field, x);
+                if (out_of_range(alone) != 0) throw Error("{}: expected values in [0, 1e9], found {:g}", field, x);
             }
             continue;
         }

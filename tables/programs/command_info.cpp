@@ -236,7 +236,7 @@ double largest_undershoot(const PackView& pack, const Source& source, TableKind 
         query.sigma = static_cast<float>(at.sigma), query.g = static_cast<float>(at.g);
         query.h = static_cast<float>(at.h), query.theta_i = static_cast<float>(at.theta_i);
         query.absorption = static_cast<float>(at.absorption);
-        const double whole = held_integral(pack[kind], contract_signed(pack[kind], query));
+        const double whole = clamped_integral(pack[kind], contract_signed(pack[kind], query));
         greatest = std::max(greatest, whole - 1);
     }
     return greatest;

@@ -1,32 +1,31 @@
-// The BCSDF in kernels: a material prepared once, then evaluated and sampled per thread. Compiled where there is an nvcc.
+// The runtime in kernels: fibres made, evaluated and drawn from per thread, on tables that were copied as bytes.
+// Compiled where there is an nvcc.
 #include "medulla/medulla.hpp"
 
 using namespace medulla;
 
-/// One exit and one sample per thread.
-__global__ void shade(const FurFibre<3>* fibre, const float* h, const RandomNumbers* u, FurSample<3>* sample,
-                      Colour<3>* near_value, Colour<3>* far_value) {
+// Host and device pass compile this file apart: one layout for both.
+static_assert(sizeof(Tables) == 280 && alignof(Tables) == 8, "layout");
+static_assert(sizeof(Fibre<3>) == 208 && alignof(Fibre<3>) == 16, "layout");
+static_assert(sizeof(NearField<3>) == 368 && alignof(NearField<3>) == 16, "layout");
+static_assert(sizeof(FarField<3>) <= 2048 && alignof(FarField<3>) == 16, "layout");
+static_assert(sizeof(Sample<3>) == 56 && sizeof(Evaluation<3>) == 16 && sizeof(RandomNumbers) == 20, "layout");
+
+/// A path vertex: the fibre of a textured material, a direction, and one light.
+__global__ void vertex(const Tables* tables, const FurParameters<3>* parameters, const Vector* known, const float* h,
+                       const RandomNumbers* u, const Vector* light, Sample<3>* sample, Evaluation<3>* lit) {
     const unsigned i = blockIdx.x * blockDim.x + threadIdx.x;
-    NearField<3> near;
-    near_field(*fibre, 0.3f, h[i], near);
-    NearSampler<3> sampler;
-    sampler.prepare(near);
-    sample[i] = sampler.sample(u[i]);
-    near_value[i] = near.eval(sample[i].theta_r, sample[i].phi);
-    far_value[i] = eval(*fibre, 0.3f, sample[i].theta_r, sample[i].phi, OffsetRange{});
+    const Fibre<3> fibre = make_fibre(parameters[i], tables);
+    const NearField<3> hit = near_field(fibre, known[i], h[i]);
+    sample[i] = hit.sample(u[i]);
+    lit[i] = hit.evaluate(light[i]);
 }
 
-/// Eight exits of one ray, and eight rays, per thread.
-__global__ void shade_many(const FurFibre<3>* fibre, const float* theta, const float* h, const float* phi,
-                           Colour<3>* exits, Colour<3>* rays) {
-    const unsigned i = 8 * (blockIdx.x * blockDim.x + threadIdx.x);
-    NearField<3> near;
-    near_field(*fibre, 0.3f, h[i], near);
-    eval(near, 8, theta + i, phi + i, exits + i);
-    eval(*fibre, 8, theta + i, h + i, theta + i, phi + i, rays + i);
-}
-
-/// `pack` is view_of_copy(a pack that the host opened, its bytes' copy on the device).
-__global__ void material(PackView pack, FurParameters<3> parameters, FurFibre<3>* fibre) {
-    prepare(parameters, pack, *fibre);
+/// The same of whole fibres.
+__global__ void far_vertex(const Fibre<3>* fibre, const Vector* known, const RandomNumbers* u, const Vector* light,
+                           Sample<3>* sample, Evaluation<3>* lit) {
+    const unsigned i = blockIdx.x * blockDim.x + threadIdx.x;
+    const FarField<3> hit = far_field(*fibre, known[i]);
+    sample[i] = hit.sample(u[i]);
+    lit[i] = hit.evaluate(light[i]);
 }

@@ -1,4 +1,4 @@
-// Numbers from every door of the BCSDF, one per line: what each compiler and target must print alike.
+// Numbers from every door of the runtime, one per line: what each compiler and target must print alike.
 #include <cstdio>
 #include <initializer_list>
 #include <limits>
@@ -7,46 +7,53 @@
 
 using namespace medulla;
 
-static UnfoldedTables tables;
+alignas(64) static unsigned char memory[4 << 20];
+
+static void print(float x) { std::printf("%.7e\n", double(x)); }
+template <int Channels>
+static void print(const Evaluation<Channels>& e) {
+    for (int c = 0; c < Channels; ++c) print(e.value[c]);
+    print(e.pdf);
+}
+template <int Channels>
+static void print(const Sample<Channels>& s) {
+    for (const float x : {s.direction.x, s.direction.y, s.direction.z, s.pdf, s.weight[0]}) print(x);
+}
 
 int main() {
-    const OpenResult opened = open_pack(default_pack_words, default_pack_size);
-    if (opened.status != PackStatus::ok) return 1;
-    const auto print = [](float x) { std::printf("%.7e\n", double(x)); };
+    const PackView pack = default_pack();
+    print(azimuthal(pack, 2.0f, 0.4f, 0.5f, 0.52f));
+    print(longitudinal(pack, Side::back, 2.0f, 0.4f, 0.5f, -0.3f));
     for (const FurPreset& preset : fur_presets) {
-        FurFibre<2> fibre;
-        if (prepare(parameters_of<2>(preset), opened.pack, fibre) != FurStatus::ok) return 1;
-        FurFibre<2> unfolded = fibre;
-        if (!unfold(unfolded, tables)) return 1;
-        for (float theta_i : {-1.2f, 0.3f}) {
-            NearField<2> near;
-            near_field(fibre, theta_i, 0.4f, near);
-            FarField<2> far;
-            far_field(fibre, theta_i, OffsetRange{}, far);
-            NearSampler<2> near_sampler;
-            near_sampler.prepare(near);
-            FarSampler<2> far_sampler;
-            far_sampler.prepare(far);
-            for (float phi : {0.5f, -2.8f}) {
-                const Colour<2> n = near.eval(0.1f - theta_i, phi), f = far.eval(0.1f - theta_i, phi);
-                for (int c = 0; c < 2; ++c) print(n.value[c]), print(f.value[c]);
-                const Colour<2> m = eval(unfolded, theta_i, 0.1f - theta_i, phi, 0.4f),
-                                g = eval(unfolded, theta_i, 0.1f - theta_i, phi, OffsetRange{});
-                for (int c = 0; c < 2; ++c) print(m.value[c]), print(g.value[c]);
-                print(near_sampler.pdf(0.1f - theta_i, phi)), print(far_sampler.pdf(0.1f - theta_i, phi));
+        const FurParameters<2> parameters = parameters_of<2>(preset);
+        const TablesResult made = make_tables(pack, ranges_of(parameters), memory, sizeof memory);
+        if (made.status != TablesStatus::ok) return 1;
+        const Fibre<2> fibre = make_fibre(parameters, made.tables);
+        if (fibre.status != FibreStatus::ok) return 1;
+        for (const float theta : {-1.2f, 0.3f}) {
+            const Vector known = direction_of(Angles{theta, 0.7f});
+            const NearField<2> hit = near_field(fibre, known, 0.4f);
+            const FarField<2> whole = far_field(fibre, known);
+            for (const float phi : {0.5f, -2.8f}) {
+                const Vector drawn = direction_of(Angles{0.1f - theta, 0.7f + phi});
+                print(hit.evaluate(drawn));
+                print(whole.evaluate(drawn));
+                print(hit.eq12(0.1f - theta, phi)[0]);
+                print(whole.eq12(0.1f - theta, phi)[1]);
             }
             const float nan = std::numeric_limits<float>::quiet_NaN();
-            const float theta_is[5] = {theta_i, -theta_i, 1.57f, nan, 1.5f}, hs[5] = {0.4f, -0.7f, 0.99f, 0.0f, -0.2f},
-                        theta_rs[5] = {0.1f - theta_i, 0.2f, -1.5f, 1.4f, -1.4f},
-                        phis[5] = {0.5f, -2.8f, 3.1f, 1.0f, 0};
-            Colour<2> S[5];
-            eval(unfolded, 5, theta_is, hs, theta_rs, phis, S);
-            for (const Colour<2>& at : S) print(at.value[0]), print(at.value[1]);
-            eval(fibre, 5, theta_is, hs, theta_rs, phis, S);
-            for (const Colour<2>& at : S) print(at.value[0]), print(at.value[1]);
-            const RandomNumbers u = {0.6f, 0.3f, 0.7f, 0.2f, 0.5f};
-            const FurSample<2> a = near_sampler.sample(u), b = far_sampler.sample(u);
-            print(a.theta_r), print(a.phi), print(a.weight[0]), print(b.theta_r), print(b.phi), print(b.weight[1]);
+            const Angles from[5] = {{theta, 0}, {-theta, 1}, {1.57f, 2}, {nan, 3}, {1.5f, -1}},
+                         to[5] = {{0.1f - theta, 0.5f}, {0.2f, -2.8f}, {-1.5f, 3.1f}, {1.4f, 1}, {-1.4f, 0}};
+            const float h[5] = {0.4f, -0.7f, 0.99f, 0.0f, -0.2f};
+            Evaluation<2> many[5];
+            evaluate_batch(fibre, 5, from, h, to, many);
+            for (const Evaluation<2>& e : many) print(e);
+            for (const float lobe : {0.01f, 0.3f, 0.6f, 0.97f}) {
+                const RandomNumbers u = {lobe, 0.3f, 0.7f, 0.2f, 0.5f};
+                print(hit.sample(u));
+                print(whole.sample(u));
+            }
+            print(hit.keep(lobe_bit(Lobe::TTs)).value(direction_of(Angles{0.1f, 2.0f}))[0]);
         }
     }
     return 0;

@@ -5,10 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <memory>
 #include <string>
 
-#include "medulla/medulla.hpp"
+#include "tests/support/fibre_of.hpp"
 
 namespace medulla::testing {
 
@@ -37,11 +36,6 @@ inline const char* exercise_tables(const PackView& pack) {
                     if (answered && !std::isfinite(scalar(table, contraction))) return "a number without an exit axis";
                     continue;
                 }
-                ExitDistribution distribution;
-                distribute(table, contraction, distribution);
-                if (bad(distribution.pdf(0.2f))) return "the density of a distribution";
-                for (const float u : {0.0f, 0.3f, 0.99999994f, 1.0f})
-                    if (answered && !std::isfinite(distribution.sample(u))) return "a drawn exit";
                 for (const float y : {-3.0f, -1e-7f, 0.0f, 0.3f, 1.5707963f, 3.1415927f, 100.0f})
                     if (bad(lobe(table, contraction, y))) return "a lobe";
             }
@@ -59,71 +53,45 @@ inline const char* exercise_tables(const PackView& pack) {
     return nullptr;
 }
 
-template <class Sampler>
-const char* exercise_sampler(const Sampler& sampler) {
-    for (const RandomNumbers& u : {RandomNumbers{0, 0, 0, 0, 0}, RandomNumbers{0.9f, 0.7f, 0.3f, 0.1f, 0.5f},
-                                   RandomNumbers{0.99999994f, 0.5f, 0.99999994f, 0.99999994f, 0.99999994f}}) {
-        const FurSample<1> s = sampler.sample(u);
-        if (s.valid && (!std::isfinite(s.theta_r) || !std::isfinite(s.phi))) return "a drawn direction";
-        if (s.valid && (!is_density(s.pdf) || !is_density(s.weight[0]))) return "a sample's density";
-        if (s.valid && !is_density(sampler.pdf(s.theta_r, s.phi))) return "a sampler's density";
+template <class Field>
+const char* exercise_field(const Field& field) {
+    for (const Angles drawn : {Angles{0.1f, 0.2f}, Angles{-1.5f, -3}, Angles{1.4f, 2}}) {
+        const Evaluation<1> e = field.evaluate(drawn);
+        if (!is_density(e.value[0]) || !is_density(e.pdf)) return "a value or its density";
+    }
+    for (const RandomNumbers& u :
+         {RandomNumbers{0, 0, 0, 0, 0}, RandomNumbers{0.9f, 0.7f, 0.3f, 0.1f, 0.5f}, RandomNumbers{1, 1, 1, 1, 1}}) {
+        const Sample<1> s = field.sample(u);
+        if (!std::isfinite(s.angles.theta) || !std::isfinite(s.angles.phi)) return "a drawn direction";
+        if (!is_density(s.pdf) || !is_density(s.weight[0])) return "a sample's density";
     }
     return nullptr;
 }
 
-/// Near and far field of a fibre, single queries and batches.
-inline const char* exercise_fibre(const FurFibre<1>& fibre) {
-    float theta_r[16], phi[16], theta_i[16], h[16];
-    for (int i = 0; i < 16; ++i) {
-        const auto x = static_cast<float>(i);
-        theta_r[i] = 0.2f * x - 1.5f, phi[i] = 0.4f * x - 3, theta_i[i] = 1.5f - 0.19f * x, h[i] = x / 7.5f - 1;
-    }
-    Colour<1> S[16];
+/// Near and far field of a fibre.
+inline const char* exercise_fibre(const Fibre<1>& fibre) {
     for (const float inclination : {0.0f, -1.2f, 1.5707f}) {
-        for (const float offset : {0.0f, 0.6f, -1.0f}) {
-            NearField<1> near;
-            near_field(fibre, inclination, offset, near);
-            if (!is_density(near.eval(0.1f, 0.2f).value[0])) return "the near field";
-            eval(near, 16, theta_r, phi, S);
-            for (const Colour<1>& at : S)
-                if (!is_density(at.value[0])) return "the near field of many exits";
-            NearSampler<1> sampler;
-            sampler.prepare(near);
-            if (const char* wrong = exercise_sampler(sampler)) return wrong;
-        }
-        for (const OffsetRange range : {OffsetRange{}, OffsetRange{0.2f, 0.3f}}) {
-            FarField<1> far;
-            far_field(fibre, inclination, range, far, FarQuality::draft);
-            if (!is_density(far.eval(0.2f, 1.0f).value[0])) return "the far field";
-            FarSampler<1> sampler;
-            sampler.prepare(far);
-            if (const char* wrong = exercise_sampler(sampler)) return wrong;
-        }
+        for (const float offset : {0.0f, 0.6f, -1.0f})
+            if (const char* wrong = exercise_field(near_field(fibre, Angles{inclination, 0}, offset))) return wrong;
+        for (const Offsets range : {Offsets{}, Offsets{0.2f, 0.3f}})
+            if (const char* wrong = exercise_field(far_field(fibre, Angles{inclination, 0}, range, FarQuality::draft)))
+                return wrong;
     }
-    eval(fibre, 16, theta_i, h, theta_r, phi, S);
-    for (const Colour<1>& at : S)
-        if (!is_density(at.value[0])) return "independent queries";
     return nullptr;
 }
 
 }  // namespace detail
 
-/// Evaluates and samples every table, and fibres of several materials, from factors and from dense tables.
+/// Evaluates every table, and evaluates and samples fibres of several materials.
 /// @return description of the first value that is not finite or below 0, empty if none
 inline std::string exercise(const PackView& pack) {
     if (const char* wrong = detail::exercise_tables(pack)) return wrong;
-    static const auto dense = std::make_unique<UnfoldedTables>();
     FurParameters<1> bobcat = parameters_of<1>(*find_preset("bobcat"));
     FurParameters<1> absorbing = bobcat, thin = bobcat;
     absorbing.sigma_ma = 0.5f, absorbing.eta = 1.3f;
     thin.sigma_ms = 1e-4f, thin.g = -0.9f;
-    for (const FurParameters<1>& material : {bobcat, absorbing, thin}) {
-        FurFibre<1> fibre;
-        if (!usable(prepare(material, pack, fibre))) continue;  // a pack without the tables of a fibre
-        if (const char* wrong = detail::exercise_fibre(fibre)) return wrong;
-        if (!unfold(fibre, *dense)) continue;
-        if (const char* wrong = detail::exercise_fibre(fibre)) return std::string(wrong) + ", dense tables";
-    }
+    for (const FurParameters<1>& material : {bobcat, absorbing, thin})
+        if (const char* wrong = detail::exercise_fibre(test::FibreOf<1>(material, pack))) return wrong;
     return "";
 }
 

@@ -9,6 +9,7 @@
 #include "medulla/config.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
 
 /// What an axis measures. The numbers are part of the pack format.
 enum class Quantity : std::uint32_t {
@@ -167,4 +168,5 @@ MEDULLA_HOT SplineWeights<T> spline_weights(const AxisView<T>& axis, const Cell<
     return {{r1 * c, l3 * c + r2 * d, l2 * d + r3 * e, l1 * e}};
 }
 
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -6,11 +6,12 @@
 #include <cmath>
 #include <cstdint>
 
-#include "medulla/blocks.hpp"
-#include "medulla/held_integral.hpp"
+#include "medulla/detail/blocks.hpp"
+#include "medulla/detail/clamped_integral.hpp"
 #include "medulla/pack.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
 
 /// Where in a table's parameter space: only the axes that the table has are read.
 struct LobeQuery {
@@ -21,18 +22,10 @@ struct LobeQuery {
     float absorption = 0;  ///< optical radius of absorption [1], >= 0
 
     MEDULLA_FN float operator[](Quantity quantity) const noexcept {
-        switch (quantity) {
-            case Quantity::sigma:
-                return sigma;
-            case Quantity::g:
-                return g;
-            case Quantity::absorption:
-                return absorption;
-            case Quantity::h:
-                return h;
-            default:
-                return theta_i;
-        }
+        if (quantity == Quantity::sigma) return sigma;
+        if (quantity == Quantity::g) return g;
+        if (quantity == Quantity::absorption) return absorption;
+        return quantity == Quantity::h ? h : theta_i;
     }
 };
 
@@ -136,24 +129,25 @@ MEDULLA_FN float inverse_integral(const TableView& table, const float* weight) n
 }
 
 /// 1 / (integral over the exit direction of the contracted lobe held to >= 0). Reads the whole exit factor.
-MEDULLA_FN float inverse_held_integral(const TableView& table, const float* weight) noexcept {
+MEDULLA_FN float inverse_clamped_integral(const TableView& table, const float* weight) noexcept {
     const float inverse = inverse_integral(table, weight);
-    return inverse / (1 + detail::dips(table, weight) * inverse);
+    return inverse / (1 + detail::undershoot(table, weight) * inverse);
 }
 
 /// Integral of lobe() over the exit direction; 0 where there is no lobe.
-MEDULLA_FN float held_integral(const TableView& table, const Contraction& contraction) noexcept {
-    const float inverse = inverse_held_integral(table, contraction.weight);
+MEDULLA_FN float clamped_integral(const TableView& table, const Contraction& contraction) noexcept {
+    const float inverse = inverse_clamped_integral(table, contraction.weight);
     return inverse > 0 ? contraction.inverse_integral / inverse : 0.0f;
 }
 
 /// Makes lobe() integrate to 1 to float precision.
-MEDULLA_FN void hold_energy(const TableView& table, Contraction& contraction) noexcept {
-    contraction.inverse_integral = inverse_held_integral(table, contraction.weight);
+MEDULLA_FN void normalise_clamped(const TableView& table, Contraction& contraction) noexcept {
+    contraction.inverse_integral = inverse_clamped_integral(table, contraction.weight);
 }
 
 /// Contracts the parameter axes of `table` at `query`; values outside an axis are held to its ends. signed_lobe()
-/// integrates to 1, lobe() to that and what its dips hold: the plain twin of contract(), four to five times as fast.
+/// integrates to 1, lobe() to that and what its undershoot hold: the plain twin of contract(), four to five times as
+/// fast.
 MEDULLA_FN Contraction contract_signed(const TableView& table, const LobeQuery& query) noexcept {
     Contraction result;
     start_contraction(table, result.weight);
@@ -168,7 +162,7 @@ MEDULLA_FN Contraction contract_signed(const TableView& table, const LobeQuery& 
 /// The same so that lobe() integrates to 1, to float precision.
 MEDULLA_FN Contraction contract(const TableView& table, const LobeQuery& query) noexcept {
     Contraction result = contract_signed(table, query);
-    if (table.has_exit()) hold_energy(table, result);
+    if (table.has_exit()) normalise_clamped(table, result);
     return result;
 }
 
@@ -182,8 +176,9 @@ MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contract
     return signed_lobe(table, contraction, exit_point(table, y));
 }
 
-/// Density per radian, >= 0, of integral 1 where `contract` made the contraction: a signed low-rank sum dips below 0
-/// where the lobe is nearly 0, and holding it there lowers the error (docs/accuracy.md gives how far it dips).
+/// Density per radian, >= 0, of integral 1 where `contract` made the contraction: a signed low-rank sum undershoot
+/// below 0 where the lobe is nearly 0, and holding it there lowers the error (docs/accuracy.md gives how far it
+/// undershoot).
 MEDULLA_FN float lobe(const TableView& table, const Contraction& contraction, float y) noexcept {
     const float value = signed_lobe(table, contraction, y);
     return value < 0 ? 0.0f : value;  // a NaN stays one
@@ -222,10 +217,13 @@ MEDULLA_FN T survival_of(T absorption, T length) noexcept {
 /// Share of the disc's scattered light that absorption leaves; h in [-1, 1]. 1 at absorption 0; NaN above it where the
 /// pack does not know.
 MEDULLA_FN float survival(const PackView& pack, float sigma, float g, float h, float absorption) noexcept {
-    if (absorption == 0) return 1;
+    if (!(absorption > 0 || absorption < 0)) return 1;
     if (!absorbs(pack)) return detail::not_a_number();
     LobeQuery query;
-    query.sigma = sigma, query.g = g, query.h = h < 0 ? -h : h, query.absorption = absorption;
+    query.sigma = sigma;
+    query.g = g;
+    query.h = h < 0 ? -h : h;
+    query.absorption = absorption;
     const TableView& table = pack[TableKind::survival];
     return survival_of(absorption, scalar(table, contract(table, query)));
 }
@@ -238,7 +236,10 @@ MEDULLA_FN float azimuthal(const PackView& pack, float sigma, float g, float h, 
     if (!table) return detail::not_a_number();
     const float side = h < 0 ? -1.0f : 1.0f;
     LobeQuery query;
-    query.sigma = sigma, query.g = g, query.h = side * h, query.absorption = absorption;
+    query.sigma = sigma;
+    query.g = g;
+    query.h = side * h;
+    query.absorption = absorption;
     const float energy = azimuthal_energy(sigma, h) * survival(pack, sigma, g, h, absorption);
     return energy * lobe(table, contract(table, query), side * phi);
 }
@@ -253,8 +254,11 @@ MEDULLA_FN float longitudinal(const PackView& pack, Side which, float sigma, flo
     if (!table) return detail::not_a_number();
     const float side = theta_i < 0 ? -1.0f : 1.0f;
     LobeQuery query;
-    query.sigma = sigma, query.g = g, query.theta_i = side * theta_i;
+    query.sigma = sigma;
+    query.g = g;
+    query.theta_i = side * theta_i;
     return lobe(table, contract(table, query), side * theta_r);
 }
 
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -10,6 +10,7 @@
 #include "medulla/config.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
 
 inline constexpr char pack_magic[8] = {'F', 'U', 'R', 'P', 'A', 'C', 'K', '\n'};
 inline constexpr std::uint32_t pack_version = 4;
@@ -300,7 +301,7 @@ MEDULLA_FN PackStatus check_knots(const AxisView<float>& axis) noexcept {
 MEDULLA_FN bool half_circle(const AxisView<float>& axis, Quantity quantity) noexcept {
     if (quantity != Quantity::phi && quantity != Quantity::theta_r) return true;
     const float end = quantity == Quantity::phi ? float(pi) : float(pi / 2);
-    return axis.lower() == 0 && std::abs(axis.upper() - end) < 1e-6f * end;
+    return !(axis.lower() < 0 || axis.lower() > 0) && std::abs(axis.upper() - end) < 1e-6f * end;
 }
 
 MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) noexcept {
@@ -357,7 +358,8 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
 /// The tables of an open pack in a copy of its bytes that lies elsewhere, in a GPU's memory for one.
 inline PackView view_of_copy(const PackView& pack, const void* copy) noexcept {
     PackView moved = pack;
-    moved.text = nullptr, moved.text_bytes = 0;
+    moved.text = nullptr;
+    moved.text_bytes = 0;
     for (TableView& table : moved.tables)
         if (table) table.bytes = static_cast<const unsigned char*>(copy);
     return moved;
@@ -397,4 +399,5 @@ inline OpenResult open_pack(const void* data, std::size_t size) noexcept {
     return result;
 }
 
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

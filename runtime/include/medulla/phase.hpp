@@ -6,6 +6,7 @@
 #include "medulla/config.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
 
 /// A direction in the plane as a unit complex number x + iy.
 template <class T>
@@ -47,4 +48,5 @@ MEDULLA_FN Direction<T> invert_planar_hg(Direction<T> scattered, T g) noexcept {
     return sample_planar_hg(scattered, -g);
 }
 
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

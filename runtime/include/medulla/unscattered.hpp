@@ -5,17 +5,20 @@
 // floor are found by its arguments' namespace. docs/bcsdf.md, 'Other scalars'.
 #pragma once
 
+#include <cstddef>
+
 #include "medulla/config.hpp"
-#include "medulla/cross_section.hpp"
+#include "medulla/detail/cross_section.hpp"
+#include "medulla/detail/gaussian.hpp"
 #include "medulla/fur_parameters.hpp"
-#include "medulla/gaussian.hpp"
 
 namespace medulla {
+inline namespace MEDULLA_TARGET {
 
 template <int Channels = 3, class T = float>
 struct UnscatteredLobes {
     T M[3];            ///< longitudinal density of R, TT, TRT [1 / radian]
-    T N[3][Channels];  ///< azimuthal density times energy [1 / radian]
+    T N[3][std::size_t(Channels)];  ///< azimuthal density times energy [1 / radian]
 };
 
 /// @param p inside the ranges of FurParameters (check() says so for float)
@@ -24,6 +27,7 @@ template <int Channels, class T>
 MEDULLA_FN UnscatteredLobes<Channels, T> unscattered_lobes(const FurParameters<Channels, T>& p, T theta_i, T theta_r,
                                                            T phi, T h) noexcept {
     using std::cos;
+    using namespace detail;
     const Inclination<T> at = inclination(p.eta, cos(theta_i), p.fresnel);
     const Path<T> path = trace(at, p.kappa, p.layers, h, square_root((T(1) - h) * (T(1) + h)));
     const auto energy = energies(path, absorption(p, at.inverse_cos_t), false);
@@ -39,4 +43,5 @@ MEDULLA_FN UnscatteredLobes<Channels, T> unscattered_lobes(const FurParameters<C
     return lobes;
 }
 
+}  // namespace MEDULLA_TARGET
 }  // namespace medulla

@@ -1,0 +1,2 @@
+// A stand-in: see kernel/types.h.
+#pragma once

@@ -1,0 +1,2 @@
+// A stand-in: see render/bsdf.h.
+#pragma once

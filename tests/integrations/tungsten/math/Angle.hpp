@@ -1,0 +1,2 @@
+// A stand-in: see bsdfs/Bsdf.hpp.
+#pragma once

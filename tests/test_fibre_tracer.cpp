@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "medulla/cross_section.hpp"
+#include "medulla/detail/cross_section.hpp"
 #include "sim2d/tracer/kernel.hpp"
 #include "sim3d/fibre_tracer.hpp"
 #include "sim3d/fibre_walk.hpp"
@@ -111,12 +111,13 @@ TEST_CASE("Fibre tracer: closed energies of smooth hair to float precision", "[s
     Light light;
     light.theta_i = 0.7;
     const FibreProfile r = trace_fibre(f, light, with(1000000));
-    const auto at = inclination(f.eta_c, std::cos(0.7), medulla::Fresnel::exact);
+    const auto at = medulla::detail::inclination(f.eta_c, std::cos(0.7), medulla::Fresnel::exact);
     double mean[2] = {};
     const int n = 20000;
     for (int i = 0; i < n; ++i) {
         const double t = (i + 0.5) / n * pi / 2, c = std::cos(t), x = std::sqrt(at.index_excess + c * c);
-        const double F = cuticle(f.layers, at.fresnel_index_excess, at.fresnel_scale * c, at.fresnel_scale * x).F;
+        const double F =
+            medulla::detail::cuticle(f.layers, at.fresnel_index_excess, at.fresnel_scale * c, at.fresnel_scale * x).F;
         const double inside = std::sin(t) * at.inverse_index;
         const double left = std::exp(-2 * std::sqrt(1 - inside * inside) * f.sigma_ca[0] * at.inverse_cos_t);
         mean[0] += F * c * pi / 2 / n, mean[1] += (1 - F) * (1 - F) * left * c * pi / 2 / n;

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "medulla/cross_section.hpp"
+#include "medulla/detail/cross_section.hpp"
 #include "medulla/fur_parameters.hpp"
 #include "sim2d/disc/deterministic.hpp"
 #include "sim2d/quadrature.hpp"
@@ -51,11 +51,11 @@ Fibre smooth(const char* name) {
 
 /// Energies of R, TT, TRT and of all higher orders of unscattered light at h: the runtime's model in double.
 void model(const Fibre& f, double theta_i, double h, double A[4]) {
-    const auto at =
-        inclination(f.eta_c, std::cos(theta_i),
-                    f.reflectance == Reflectance::exact ? medulla::Fresnel::exact : medulla::Fresnel::bravais);
+    const auto at = medulla::detail::inclination(
+        f.eta_c, std::cos(theta_i),
+        f.reflectance == Reflectance::exact ? medulla::Fresnel::exact : medulla::Fresnel::bravais);
     const double c = std::sqrt(1 - h * h), x = std::sqrt(at.index_excess + c * c), s = at.fresnel_scale;
-    const double F = cuticle(f.layers, at.fresnel_index_excess, s * c, s * x).F;
+    const double F = medulla::detail::cuticle(f.layers, at.fresnel_index_excess, s * c, s * x).F;
     const double inside = h * at.inverse_index;
     const double s_m = std::sqrt(std::max(0.0, f.kappa * f.kappa - inside * inside));
     const double s_c = std::sqrt(1 - inside * inside) - s_m;

@@ -63,7 +63,7 @@ void warn_beyond_axes(const FurParameters<3>& p, double theta_i, double offset, 
 /// Dense tables in memory of their own; empty for a fibre that does not scatter.
 struct OwnedTables {
     std::unique_ptr<void, decltype(&std::free)> memory{nullptr, &std::free};
-    const Tables* view = nullptr;
+    const medulla::Tables* view = nullptr;
 };
 OwnedTables tables_for(const FurParameters<3>& p, const PackView& pack, const std::string& path) {
     OwnedTables tables;
@@ -141,7 +141,7 @@ void run_bcsdf(const BcsdfOptions& options) {
     if (options.json)
         print("{}\n", json_line(json));
     else
-        print("sum      {:.6g}\n", fmt::join(sum, sum + (material.grey ? 1 : 3), "  "));
+        print("{}\n", fmt::format("sum      {:.6g}", fmt::join(sum, sum + (material.grey ? 1 : 3), "  ")));
 }
 
 struct PresetOptions {

@@ -127,7 +127,7 @@ int main(int argc, char** argv) {
         const std::unique_ptr<char[]> memory(new char[room]);
         void* aligned = memory.get();
         std::align(64, bytes, aligned, room);
-        const Tables* tables = make_tables(default_pack(), ranges, aligned, bytes).tables;
+        const DenseTables* tables = make_tables(default_pack(), ranges, aligned, bytes).tables;
         for (const float wanted : {0.05f, 0.1f, 0.2f, 0.3f, 0.45f, 0.6f, 0.75f, 0.9f}) {
             const float colour[1] = {wanted};
             const SigmaOfColour<1> answer = sigma_ca_of_fur_colour(p, colour);

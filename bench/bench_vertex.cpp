@@ -69,7 +69,7 @@ std::vector<PathHit> random_hits() {
     return hits;
 }
 
-/// Tables in memory of their own.
+/// DenseTables in memory of their own.
 class OwnedTables {
   public:
     explicit OwnedTables(const TableRanges& ranges) {
@@ -81,11 +81,11 @@ class OwnedTables {
         if (made.status != TablesStatus::ok) std::fprintf(stderr, "%s\n", describe(made.status)), std::exit(1);
         tables_ = made.tables;
     }
-    const Tables* get() const { return tables_; }
+    const DenseTables* get() const { return tables_; }
 
   private:
     std::unique_ptr<char[]> memory_;
-    const Tables* tables_ = nullptr;
+    const DenseTables* tables_ = nullptr;
 };
 
 /// The vertex of any field.
@@ -106,7 +106,7 @@ float chiang_vertex(const PathHit& hit) {
 }
 
 /// The pass that a wavefront renderer makes of it: all fields, then all samples, then all lights.
-float batch(const std::vector<PathHit>& hits, const Tables* tables, std::vector<NearField<3>>& fields) {
+float batch(const std::vector<PathHit>& hits, const DenseTables* tables, std::vector<NearField<3>>& fields) {
     float sum = 0;
     for (int i = 0; i < hit_count; ++i) {
         const PathHit& hit = hits[std::size_t(i)];
@@ -136,7 +136,7 @@ double error_of(const std::vector<PathHit>& hits, Value&& value, Exact&& exact) 
 }
 
 /// The paper's five lobes against the reference implementation in double, which reads the pack's factors.
-double near_error(const std::vector<PathHit>& hits, FurParameters<3> PathHit::*parameters, const Tables* tables) {
+double near_error(const std::vector<PathHit>& hits, FurParameters<3> PathHit::*parameters, const DenseTables* tables) {
     const PackView pack = default_pack();
     return error_of(
         hits,
@@ -200,7 +200,7 @@ int main(int argc, char** argv) {
     for (const PathHit& hit : hits) wide = join(wide, ranges_of(hit.textured_medulla));
     const OwnedTables one(ranges), textured(wide);
     const Fibre<3> coat = make_fibre(hits[0].coat, one.get());
-    const auto near_row = [&hits](FurParameters<3> PathHit::*parameters, const Tables* tables) {
+    const auto near_row = [&hits](FurParameters<3> PathHit::*parameters, const DenseTables* tables) {
         return [&hits, parameters, tables](int i) {
             const PathHit& hit = hits[std::size_t(i)];
             return vertex(near_field(make_fibre(hit.*parameters, tables), hit.known, hit.h), hit);

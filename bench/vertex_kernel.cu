@@ -18,14 +18,14 @@ __device__ Colour<3> vertex(const Field& field, RandomNumbers u, Vector light, V
 
 }  // namespace
 
-extern "C" __global__ void near_vertex(const FurParameters<3>* parameters, const Tables* tables, const Vector* known,
+extern "C" __global__ void near_vertex(const FurParameters<3>* parameters, const DenseTables* tables, const Vector* known,
                                        const float* h, const RandomNumbers* u, const Vector* light, Vector* drawn,
                                        Colour<3>* sum) {
     const unsigned i = blockIdx.x * blockDim.x + threadIdx.x;
     sum[i] = vertex(near_field(make_fibre(parameters[i], tables), known[i], h[i]), u[i], light[i], drawn[i]);
 }
 
-extern "C" __global__ void far_vertex(const FurParameters<3>* parameters, const Tables* tables, const Vector* known,
+extern "C" __global__ void far_vertex(const FurParameters<3>* parameters, const DenseTables* tables, const Vector* known,
                                       const RandomNumbers* u, const Vector* light, Vector* drawn, Colour<3>* sum) {
     const unsigned i = blockIdx.x * blockDim.x + threadIdx.x;
     sum[i] = vertex(far_field(make_fibre(parameters[i], tables), known[i]), u[i], light[i], drawn[i]);

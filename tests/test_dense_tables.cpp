@@ -233,7 +233,7 @@ TEST_CASE("cutting a density at 0 hides no NaN", "[bcsdf]") {
     const float nan = std::numeric_limits<float>::quiet_NaN();
     const Angles known = {0.3f, 0}, drawn = {-0.2f, 0.4f};
     REQUIRE(near_field(fibre, known, 0.4f).value(drawn)[0] > 0);
-    const Tables& t = *fibre.tables;
+    const DenseTables& t = *fibre.tables;
     const std::uint32_t ends[2][2] = {{t.azimuthal, t.azimuthal_blocks}, {t.longitudinal, t.longitudinal_blocks}};
     for (const auto& [from, to] : ends) {
         const std::vector<unsigned char> kept(fibre.owned.memory() + from, fibre.owned.memory() + to);

@@ -201,7 +201,7 @@ TEST_CASE("all four rounding modes give the same light, and no operation is inva
     struct Light {
         float near, pdf, far, weight;
     };
-    const auto light = [](int mode, const FurParameters<3>& p, const Tables* tables, Angles known, Angles drawn,
+    const auto light = [](int mode, const FurParameters<3>& p, const DenseTables* tables, Angles known, Angles drawn,
                           float h) {
         Light l;
         std::fesetround(mode), std::feclearexcept(FE_ALL_EXCEPT);

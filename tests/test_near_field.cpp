@@ -19,7 +19,7 @@ const AnalyticPack& pack() {
     return p;
 }
 
-/// Tables that cover every fibre of these tests.
+/// DenseTables that cover every fibre of these tests.
 const test::OwnedTables& wide_tables() {
     static const test::OwnedTables tables(pack().view, {0, 0.79f, 0, 16, 0});
     return tables;

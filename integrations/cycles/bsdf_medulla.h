@@ -60,7 +60,7 @@ ccl_device bool bsdf_medulla_setup(ccl_private ShaderData *sd,
                                    ccl_private MedullaBSDF *bsdf,
                                    const ClosureType type,
                                    const medulla::FurParameters<3> &parameters,
-                                   const medulla::Tables *tables)
+                                   const medulla::DenseTables *tables)
 {
   ccl_private void *memory = closure_alloc_extra(sd, sizeof(medulla::Fibre<3>));
   if (memory == nullptr) {

@@ -125,7 +125,7 @@ class Medulla final : public BSDF<Float, Spectrum> {
     medulla::FurParameters<Channels> m_parameters;
     ref<Texture> m_sigma_ca;                    // [1 / fibre radius]
     std::unique_ptr<unsigned char[]> m_memory;  // of the tables
-    const medulla::Tables* m_tables = nullptr;
+    const medulla::DenseTables* m_tables = nullptr;
 };
 
 MI_EXPORT_PLUGIN(Medulla)

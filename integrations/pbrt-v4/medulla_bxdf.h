@@ -21,7 +21,7 @@ class MedullaBxDF {
     MedullaBxDF() = default;
 
     /// @param parameters sigma_ca: one value for each wavelength of the path  @param v the curve's second parameter
-    PBRT_CPU_GPU MedullaBxDF(const medulla::FurParameters<NSpectrumSamples>& parameters, const medulla::Tables* tables,
+    PBRT_CPU_GPU MedullaBxDF(const medulla::FurParameters<NSpectrumSamples>& parameters, const medulla::DenseTables* tables,
                              Float v)
         : fibre(medulla::make_fibre(parameters, tables)), h(1 - 2 * v) {}
 

@@ -63,7 +63,7 @@ void warn_beyond_axes(const FurParameters<3>& p, double theta_i, double offset, 
 /// Dense tables in memory of their own; empty for a fibre that does not scatter.
 struct OwnedTables {
     std::unique_ptr<void, decltype(&std::free)> memory{nullptr, &std::free};
-    const medulla::Tables* view = nullptr;
+    const DenseTables* view = nullptr;
 };
 OwnedTables tables_for(const FurParameters<3>& p, const PackView& pack, const std::string& path) {
     OwnedTables tables;

@@ -5,14 +5,14 @@
 using namespace medulla;
 
 // Host and device pass compile this file apart: one layout for both.
-static_assert(sizeof(Tables) == 280 && alignof(Tables) == 8, "layout");
+static_assert(sizeof(DenseTables) == 280 && alignof(DenseTables) == 8, "layout");
 static_assert(sizeof(Fibre<3>) == 208 && alignof(Fibre<3>) == 16, "layout");
 static_assert(sizeof(NearField<3>) == 368 && alignof(NearField<3>) == 16, "layout");
 static_assert(sizeof(FarField<3>) <= 2048 && alignof(FarField<3>) == 16, "layout");
 static_assert(sizeof(Sample<3>) == 56 && sizeof(Evaluation<3>) == 16 && sizeof(RandomNumbers) == 20, "layout");
 
 /// A path vertex: the fibre of a textured material, a direction, and one light.
-__global__ void vertex(const Tables* tables, const FurParameters<3>* parameters, const Vector* known, const float* h,
+__global__ void vertex(const DenseTables* tables, const FurParameters<3>* parameters, const Vector* known, const float* h,
                        const RandomNumbers* u, const Vector* light, Sample<3>* sample, Evaluation<3>* lit) {
     const unsigned i = blockIdx.x * blockDim.x + threadIdx.x;
     const Fibre<3> fibre = make_fibre(parameters[i], tables);

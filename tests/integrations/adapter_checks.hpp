@@ -127,7 +127,7 @@ void check(Make&& make) {
     }
 }
 
-/// Tables of a material in memory of their own.
+/// DenseTables of a material in memory of their own.
 class OwnedTables {
   public:
     explicit OwnedTables(const medulla::FurParameters<3>& p) {
@@ -138,11 +138,11 @@ class OwnedTables {
         std::align(64, bytes, aligned, room);
         tables_ = medulla::make_tables(medulla::default_pack(), ranges, aligned, bytes).tables;
     }
-    const medulla::Tables* get() const { return tables_; }
+    const medulla::DenseTables* get() const { return tables_; }
 
   private:
     std::unique_ptr<char[]> memory_;
-    const medulla::Tables* tables_ = nullptr;
+    const medulla::DenseTables* tables_ = nullptr;
 };
 
 }  // namespace adapters

@@ -17,9 +17,9 @@ class OwnedTables {
         if (bytes_ > 0) memory_.reset(::operator new(bytes_, std::align_val_t(64)));
         result_ = make_tables(pack, ranges, memory_.get(), bytes_);
     }
-    const Tables* get() const { return result_.tables; }
-    const Tables& operator*() const { return *result_.tables; }
-    const Tables* operator->() const { return result_.tables; }
+    const DenseTables* get() const { return result_.tables; }
+    const DenseTables& operator*() const { return *result_.tables; }
+    const DenseTables* operator->() const { return result_.tables; }
     TablesStatus status() const { return result_.status; }
     std::size_t bytes() const { return bytes_; }
     /// To damage them.

@@ -51,7 +51,7 @@ class Factors : public Medulla {
 class DenseReader : public Medulla {
   public:
     /// @param tables made of this pack for these ranges
-    DenseReader(const PackView& pack, const TableRanges& ranges, const Tables& tables) : t_(tables) {
+    DenseReader(const PackView& pack, const TableRanges& ranges, const DenseTables& tables) : t_(tables) {
         detail::plan_tables(pack, ranges, plan_);
     }
     bool absorbs() const override { return t_.absorbs != 0; }
@@ -119,7 +119,7 @@ class DenseReader : public Medulla {
         for (std::uint32_t k = 0; k < 4; ++k) sum += exit.w[k] * double(row[std::size_t(exit.first + k) * stride]);
         return std::max(0.0, sum);
     }
-    const Tables& t_;
+    const DenseTables& t_;
     detail::TablesPlan plan_;
 };
 

@@ -478,7 +478,7 @@ MEDULLA_FN typename FarField<Channels>::Means FarField<Channels>::means(float ph
         m.share[5] = even * residual_share;
     }
     if (this->tables == nullptr || !(mask & (lobe_bit(Lobe::TTs) | lobe_bit(Lobe::TRTs)))) return m;
-    const Tables& t = *this->tables;
+    const DenseTables& t = *this->tables;
     TableRows at = this->rows;
     visit_scattered(*this, [&](const Offset<Four>& h, const Path<Four>& path, Four weight) {
         const Energies<Channels, Four> e = energies_at(*this, path);
@@ -519,7 +519,7 @@ MEDULLA_FN LobeValues<Channels> FarField<Channels>::lobes(float theta_r, float p
     for (int k = 0; k < 3; ++k) result.M[k] = lane(M, k);
     result.M[5] = lane(M, 3);
     if (this->tables != nullptr) {
-        const Tables& t = *this->tables;
+        const DenseTables& t = *this->tables;
         const ExitPlaces place =
             exit_places(turns_of(Four(known_theta < 0 ? -theta_r : theta_r)), Four(4 * t.theta_r.end));
         result.M[3] = result.M[4] = longitudinal_density(t, this->rows, place, 0, magnitude(turned) * float(1 / pi));
@@ -538,7 +538,7 @@ MEDULLA_FN Evaluation<Channels> FarField<Channels>::at(float theta_r, float cosi
     const Four M = this->longitudinal.pdf(Four(theta_r));
     float along[all_lobe_count] = {lane(M, 0), lane(M, 1), lane(M, 2), 0, 0, lane(M, 3)};
     if (this->tables != nullptr) {
-        const Tables& t = *this->tables;
+        const DenseTables& t = *this->tables;
         const ExitPlaces place =
             exit_places(turns_of(Four(known_theta < 0 ? -theta_r : theta_r)), Four(4 * t.theta_r.end));
         along[3] = along[4] = longitudinal_density(t, this->rows, place, 0, magnitude(phi) * float(1 / pi));

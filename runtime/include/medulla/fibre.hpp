@@ -56,7 +56,7 @@ struct Fibre {
     FurParameters<Channels> parameters;
     FibreStatus status = FibreStatus::bad_parameters;
     std::uint32_t out_of_range = 0;           ///< bits of Parameter
-    const Tables* tables = nullptr;           ///< null: no scattered lobes
+    const DenseTables* tables = nullptr;           ///< null: no scattered lobes
     alignas(16) float shift[4] = {};          ///< alpha_p of Table 2 for R, TT, TRT and the residual lobe [radians]
     alignas(16) float deviation[4] = {};      ///< beta_p of Table 2 [radians]
     detail::WrappedGaussians azimuthal = {};  ///< variance (p + 1) beta_n^2 (Eq. 16)
@@ -70,7 +70,7 @@ static_assert(sizeof(Fibre<3>) <= 256, "a fibre fits into a closure");
 /// @param tables made for ranges that hold the parameters; may be null. Only eta, kappa, sigma_ms, sigma_ma and g ask
 ///        something of them: colour, roughness, tilt and layers are free.
 template <int Channels>
-MEDULLA_FN Fibre<Channels> make_fibre(const FurParameters<Channels>& parameters, const Tables* tables,
+MEDULLA_FN Fibre<Channels> make_fibre(const FurParameters<Channels>& parameters, const DenseTables* tables,
                                       OutOfRange out = OutOfRange::black) noexcept {
     Fibre<Channels> f;
     FurParameters<Channels>& p = f.parameters;

@@ -4,7 +4,7 @@
 //   const PackView pack = default_pack();                         once per program; open_pack(bytes, count) for others
 //   const TableRanges ranges = ranges_of(parameters);             once per coat; join(a, b) covers two materials
 //   const std::size_t bytes = tables_bytes(pack, ranges);
-//   const Tables* tables = make_tables(pack, ranges, memory, bytes).tables;   memory of yours, aligned to 64 bytes
+//   const DenseTables* tables = make_tables(pack, ranges, memory, bytes).tables;   memory of yours, aligned to 64 bytes
 //
 //   const Fibre<3> fibre = make_fibre(parameters, tables);        at a hit, or once: 13 numbers, textured or not
 //   const NearField<3> hit = near_field(fibre, known, h);         a ray that meets the fibre at offset h

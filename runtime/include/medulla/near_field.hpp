@@ -79,7 +79,7 @@ MEDULLA_HOT Four channel_mask(int b) noexcept {
 template <int Channels>
 struct FieldBase {
     Polar known;           ///< cosine 0: nothing is lit, every value is 0, and nothing else is set
-    const Tables* tables;  ///< null: no scattered lobes
+    const DenseTables* tables;  ///< null: no scattered lobes
     TruncatedGaussians longitudinal;
     WrappedGaussians azimuthal;
     TableRows rows;
@@ -204,7 +204,7 @@ struct NearField : detail::FieldBase<Channels> {
         return at(between.theta, drawn.cosine, between.phi);
     }
     MEDULLA_HOT detail::ExitPlaces places(float theta_r, float phi) const noexcept {
-        const Tables& t = *this->tables;
+        const DenseTables& t = *this->tables;
         return detail::exit_places(
             detail::turns_of(detail::Four(side * (phi - scattered_centre[0]), side * (phi - scattered_centre[1]),
                                           known_theta < 0 ? -theta_r : theta_r, phi)),
@@ -224,7 +224,7 @@ MEDULLA_HOT detail::LobeDensities NearField<Channels>::densities(float theta_r, 
     d.x[5] = d.x[3];
     d.x[3] = d.x[4] = 0;
     if (this->tables == nullptr) return d;
-    const Tables& t = *this->tables;
+    const DenseTables& t = *this->tables;
     const ExitPlaces exits = places(theta_r, phi);
     const float M = longitudinal_density(t, this->rows, exits, 2, exits.place[3]);
     d.x[3] = M * azimuthal_density(t, this->rows, exits, 0);
@@ -285,7 +285,7 @@ MEDULLA_FN LobeValues<Channels> NearField<Channels>::lobes(float theta_r, float 
     for (int k = 0; k < 3; ++k) result.M[k] = lane(M, k);
     result.M[5] = lane(M, 3);
     if (this->tables != nullptr) {
-        const Tables& t = *this->tables;
+        const DenseTables& t = *this->tables;
         const ExitPlaces exits = places(theta_r, phi);
         result.M[3] = result.M[4] = longitudinal_density(t, this->rows, exits, 2, exits.place[3]);
         for (int p = 0; p < 2; ++p) density[3 + p] = azimuthal_density(t, this->rows, exits, p);

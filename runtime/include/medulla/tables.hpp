@@ -43,8 +43,8 @@ MEDULLA_FN TableRanges join(const TableRanges& a, const TableRanges& b) noexcept
             a.sigma_high > b.sigma_high ? a.sigma_high : b.sigma_high, a.absorption};
 }
 
-/// Tables as they lie in memory; made by make_tables. Arrays follow the struct.
-struct Tables {
+/// Dense tables as they lie in memory; made by make_tables. Arrays follow the struct.
+struct DenseTables {
     std::uint64_t magic;    ///< tables_magic
     std::uint64_t bytes;    ///< of everything
     TableRanges ranges;     ///< what they cover: as asked for, within the pack's axes
@@ -64,7 +64,7 @@ struct Tables {
     MEDULLA_HOT std::uint32_t azimuthal_step() const noexcept { return sigma.rows; }
     MEDULLA_HOT std::uint32_t longitudinal_step() const noexcept { return 2 * sigma.rows; }
 };
-static_assert(sizeof(Tables) == 280, "one layout everywhere");
+static_assert(sizeof(DenseTables) == 280, "one layout everywhere");
 inline constexpr std::uint64_t tables_magic = 0x314c42544c44454du;  // "MEDLTBL1"
 
 enum class TablesStatus {
@@ -104,7 +104,7 @@ MEDULLA_FN const char* describe(TablesStatus status) noexcept {
 }
 
 struct TablesResult {
-    const Tables* tables;  ///< null unless status is ok
+    const DenseTables* tables;  ///< null unless status is ok
     TablesStatus status;
 };
 

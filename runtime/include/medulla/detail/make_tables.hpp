@@ -35,7 +35,7 @@ struct SigmaStep {
 /// All that is decided before memory is touched.
 struct TablesPlan {
     TablesStatus status = TablesStatus::ok;
-    Tables layout = {};
+    DenseTables layout = {};
     AxisPlan axis[6];  ///< sigma, g, h, theta_i, phi, theta_r
     std::uint32_t stretches[6] = {};
     TableView azimuthal, side[2], survival;
@@ -93,7 +93,7 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     if (absorbs(pack)) plan.survival = pack[TableKind::survival];
     if (plan.survival && !same_axis(plan.azimuthal, plan.survival, Quantity::h)) return fail(TablesStatus::bad_axes);
 
-    Tables& t = plan.layout;
+    DenseTables& t = plan.layout;
     t.magic = tables_magic;
     t.absorbs = plan.survival ? 1u : 0u;
     t.ranges = asked;
@@ -121,7 +121,7 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
         !(plan.axis[3].upper() > 0.999999))
         return fail(TablesStatus::bad_axes);
     SplineAxis* const axes[6] = {&t.sigma, &t.g, &t.h, &t.theta_i, &t.phi, &t.theta_r};
-    std::uint64_t at = sizeof(Tables);
+    std::uint64_t at = sizeof(DenseTables);
     const auto place = [&](std::uint64_t size) {
         const std::uint64_t from = (at + 63) / 64 * 64;
         at = from + size;
@@ -261,7 +261,7 @@ MEDULLA_FN void finish_row(const SplineAxis& axis, float* row, std::uint32_t str
     for (std::uint32_t b = 0; b < count; ++b) blocks[b] = blocks[b] < integral ? blocks[b] / integral : 1.0f;
 }
 
-MEDULLA_FN void fill_tables(const TablesPlan& plan, Tables& t) noexcept {
+MEDULLA_FN void fill_tables(const TablesPlan& plan, DenseTables& t) noexcept {
     const std::uint32_t sigmas = t.sigma.rows, gs = t.g_rows;
     const auto floats = [&](std::uint32_t offset) { return const_cast<float*>(t.floats(offset)); };
     float *azimuthal = floats(t.azimuthal), *longitudinal = floats(t.longitudinal), *survival = floats(t.survival);
@@ -325,7 +325,7 @@ MEDULLA_FN TablesResult make_tables(const PackView& pack, const TableRanges& ran
     if (memory == nullptr) return fail(TablesStatus::null_memory);
     if (reinterpret_cast<std::uintptr_t>(memory) % 64 != 0) return fail(TablesStatus::unaligned_memory);
     if (bytes < plan.layout.bytes) return fail(TablesStatus::too_little_memory);
-    auto* const tables = static_cast<Tables*>(memory);
+    auto* const tables = static_cast<DenseTables*>(memory);
     std::memset(memory, 0, std::size_t(plan.layout.bytes));
     *tables = plan.layout;
     detail::SplineAxis* const axes[6] = {&tables->sigma,   &tables->g,   &tables->h,

@@ -52,12 +52,12 @@ MEDULLA_HOT void set_row(const SplineAxis& axis, float coordinate, std::uint32_t
 }
 
 /// Sets the rows of h. @param offset of the ray in the medulla [medulla radii], >= 0
-MEDULLA_HOT void set_offset(const Tables& t, float offset, TableRows& at) noexcept {
+MEDULLA_HOT void set_offset(const DenseTables& t, float offset, TableRows& at) noexcept {
     set_row(t.h, chord_coordinate(offset < 1 ? offset : 1.0f), at.h_first, at.h);
     at.azimuthal = (at.g_first * t.h.rows + at.h_first) * 2 * t.phi.rows * t.azimuthal_step() + at.sigma_first;
 }
 /// Sets the rows of sigma and theta_i. @param theta [radians]
-MEDULLA_HOT void set_inclination(const Tables& t, float sigma, float theta, TableRows& at) noexcept {
+MEDULLA_HOT void set_inclination(const DenseTables& t, float sigma, float theta, TableRows& at) noexcept {
     set_row(t.sigma, std::sqrt(sigma), at.sigma_first, at.sigma);
     set_row(t.theta_i, chord_coordinate(magnitude(theta) * float(2 / pi)), at.theta_first, at.theta_i);
     at.longitudinal =
@@ -88,7 +88,7 @@ MEDULLA_HOT Four row_density(const float* row, std::size_t step, Four w0, Four w
 }
 
 /// C^N at exit i [1 / radian].
-MEDULLA_HOT float azimuthal_density(const Tables& t, const TableRows& at, const ExitPlaces& places, int i) noexcept {
+MEDULLA_HOT float azimuthal_density(const DenseTables& t, const TableRows& at, const ExitPlaces& places, int i) noexcept {
     const RowPoint exit = t.phi.at_place(std::uint32_t(places.stretch[i]), places.place[i]);
     const std::size_t step = t.azimuthal_step(), h_step = step * 2 * t.phi.rows, g_step = h_step * t.h.rows;
     const Four w0 = spread<0>(exit.weight), w1 = spread<1>(exit.weight), w2 = spread<2>(exit.weight),
@@ -109,7 +109,7 @@ MEDULLA_HOT float azimuthal_density(const Tables& t, const TableRows& at, const 
 }
 
 /// M^s of Eq. 19 at exit i: C^M back and forward, blended by |phi| / pi [1 / radian].
-MEDULLA_HOT float longitudinal_density(const Tables& t, const TableRows& at, const ExitPlaces& places, int i,
+MEDULLA_HOT float longitudinal_density(const DenseTables& t, const TableRows& at, const ExitPlaces& places, int i,
                                        float forwardness) noexcept {
     const RowPoint exit = t.theta_r.at_place(std::uint32_t(places.stretch[i]), places.place[i]);
     const std::size_t step = t.longitudinal_step(), theta_step = step * 2 * t.theta_r.rows,
@@ -147,7 +147,7 @@ MEDULLA_HOT std::uint32_t draw_row(const float (&weight)[4], float& u) noexcept 
 
 /// Draws the azimuth of a scattered lobe from its shift, as seen from h >= 0 [radians].
 /// @param which picks the rows  @param u is inverted; both in [0, 1]
-MEDULLA_HOT float draw_azimuth(const Tables& t, const TableRows& at, float which, float u) noexcept {
+MEDULLA_HOT float draw_azimuth(const DenseTables& t, const TableRows& at, float which, float u) noexcept {
     const std::uint32_t g = at.g_count == 1 ? 0 : at.g_first + draw_row(at.g, which),
                         h = at.h_first + draw_row(at.h, which),
                         sigma = at.sigma_first + draw_span(at.sigma, which).span;
@@ -165,7 +165,7 @@ struct LongitudeDraw {
     BlockDraw block[2];  ///< back, forward
 };
 /// @param which, u as above
-MEDULLA_HOT LongitudeDraw begin_longitude(const Tables& t, const TableRows& at, float which, float u) noexcept {
+MEDULLA_HOT LongitudeDraw begin_longitude(const DenseTables& t, const TableRows& at, float which, float u) noexcept {
     const std::uint32_t g = at.g_count == 1 ? 0 : at.g_first + draw_row(at.g, which),
                         theta = at.theta_first + draw_row(at.theta_i, which),
                         sigma = draw_row(at.sigma, which) + at.sigma_first;
@@ -178,13 +178,13 @@ MEDULLA_HOT LongitudeDraw begin_longitude(const Tables& t, const TableRows& at, 
              draw_block(t.theta_r, cumulated + std::size_t(t.sigma.rows) * blocks, u)}};
 }
 /// theta_r, as seen from theta_i >= 0 [radians]. @param forwardness |phi| / pi
-MEDULLA_HOT float finish_longitude(const Tables& t, const LongitudeDraw& draw, float forwardness) noexcept {
+MEDULLA_HOT float finish_longitude(const DenseTables& t, const LongitudeDraw& draw, float forwardness) noexcept {
     const auto forward = std::uint32_t(draw.side < forwardness);
     return draw_in_block(t.theta_r, draw.row + forward * t.sigma.rows, t.longitudinal_step(), draw.block[forward]);
 }
 
 /// What -log(survival) is per absorption, at one offset.
-MEDULLA_FN float survival_length(const Tables& t, const TableRows& at) noexcept {
+MEDULLA_FN float survival_length(const DenseTables& t, const TableRows& at) noexcept {
     const std::size_t step = t.sigma.rows, g_step = step * t.h.rows;
     const float* row = t.floats(t.survival) + at.g_first * g_step + at.h_first * step + at.sigma_first;
     float length = 0;

@@ -137,7 +137,7 @@ double error_of(const std::vector<PathHit>& hits, Value&& value, Exact&& exact) 
 
 /// The paper's five lobes against the reference implementation in double, which reads the pack's factors.
 double near_error(const std::vector<PathHit>& hits, FurParameters<3> PathHit::*parameters, const DenseTables* tables) {
-    const PackView pack = default_pack();
+    const reference::Factors factors(default_pack());
     return error_of(
         hits,
         [&](const PathHit& hit) {
@@ -148,8 +148,9 @@ double near_error(const std::vector<PathHit>& hits, FurParameters<3> PathHit::*p
         },
         [&](const PathHit& hit) {
             const Angles known = angles_of(hit.known), light = angles_of(hit.light);
-            const auto lobes = reference::near_lobes(hit.*parameters, pack, double(known.theta), double(light.theta),
-                                                     double(light.phi) - double(known.phi), double(hit.h));
+            const auto lobes =
+                reference::near_lobes(hit.*parameters, &factors, double(known.theta), double(light.theta),
+                                      double(light.phi) - double(known.phi), double(hit.h));
             double sum = 0;
             for (int k = 0; k < 5; ++k) sum += lobes.M[k] * lobes.N[k][0];
             return sum;

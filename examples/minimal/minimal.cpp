@@ -29,7 +29,8 @@ int main() {
                 double(next.direction.x), double(next.direction.y), double(next.direction.z), double(next.pdf),
                 double(next.weight[0]), double(hit.albedo()[0]));
 
-    std::printf("energy per steradian at the camera's inclination, by azimuth from the camera (180: straight through)\n");
+    std::printf(
+        "energy per steradian at the camera's inclination, by azimuth from the camera (180: straight through)\n");
     const FarField<3> whole = far_field(fibre, camera);
     for (int degrees = -180; degrees <= 180; degrees += 20) {
         const Angles seen = angles_of(camera);

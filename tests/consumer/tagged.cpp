@@ -13,9 +13,9 @@ extern "C" int NAME() {
     if (made.status != TablesStatus::ok) return 1;
     const NearField<3> hit = near_field(make_fibre(parameters, made.tables), Vector{0.2f, 0.9f, 0.3f}, 0.4f);
     const Sample<3> s = hit.sample({0.6f, 0.3f, 0.7f, 0.2f, 0});
-    const float value = hit.value(Vector{-0.3f, -0.8f, 0.1f})[0] + far_field(make_fibre(parameters, made.tables),
-                                                                            Vector{0.2f, 0.9f, 0.3f})
-                                                                       .value(Vector{0.1f, 0.5f, 0.5f})[1];
+    const float value =
+        hit.value(Vector{-0.3f, -0.8f, 0.1f})[0] +
+        far_field(make_fibre(parameters, made.tables), Vector{0.2f, 0.9f, 0.3f}).value(Vector{0.1f, 0.5f, 0.5f})[1];
     std::printf("%.5f %.5f\n", double(value), double(s.pdf));
     return value == value && s.valid ? 0 : 1;
 }

@@ -56,12 +56,12 @@ struct Fibre {
     FurParameters<Channels> parameters;
     FibreStatus status = FibreStatus::bad_parameters;
     std::uint32_t out_of_range = 0;           ///< bits of Parameter
-    const DenseTables* tables = nullptr;           ///< null: no scattered lobes
+    const DenseTables* tables = nullptr;      ///< null: no scattered lobes
     alignas(16) float shift[4] = {};          ///< alpha_p of Table 2 for R, TT, TRT and the residual lobe [radians]
     alignas(16) float deviation[4] = {};      ///< beta_p of Table 2 [radians]
     detail::WrappedGaussians azimuthal = {};  ///< variance (p + 1) beta_n^2 (Eq. 16)
     alignas(16) float sigma_ca[std::size_t(detail::channel_lanes<Channels>)] = {};  ///< the parameters', padded with 0
-    alignas(16) float g_weight[4] = {};                                ///< of rows of g
+    alignas(16) float g_weight[4] = {};                                             ///< of rows of g
     std::uint32_t g_count = 0, g_first = 0;
 };
 static_assert(sizeof(Fibre<3>) <= 256, "a fibre fits into a closure");

@@ -78,7 +78,7 @@ MEDULLA_HOT Four channel_mask(int b) noexcept {
 /// Everything of a field but its offsets. Set where the known direction is one.
 template <int Channels>
 struct FieldBase {
-    Polar known;           ///< cosine 0: nothing is lit, every value is 0, and nothing else is set
+    Polar known;                ///< cosine 0: nothing is lit, every value is 0, and nothing else is set
     const DenseTables* tables;  ///< null: no scattered lobes
     TruncatedGaussians longitudinal;
     WrappedGaussians azimuthal;

@@ -17,7 +17,7 @@ inline namespace MEDULLA_TARGET {
 
 template <int Channels = 3, class T = float>
 struct UnscatteredLobes {
-    T M[3];            ///< longitudinal density of R, TT, TRT [1 / radian]
+    T M[3];                         ///< longitudinal density of R, TT, TRT [1 / radian]
     T N[3][std::size_t(Channels)];  ///< azimuthal density times energy [1 / radian]
 };
 

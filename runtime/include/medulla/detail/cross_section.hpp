@@ -121,10 +121,10 @@ MEDULLA_FN T scattered_centre(int p, T gamma_i, T gamma_t) noexcept {
 /// What the inclination decides for attenuation: coefficients over cos theta_t and T_b of Eq. 20.
 template <int Channels, class T = float>
 struct Absorption {
-    T medulla_extinction;  ///< (sigma_ma + sigma_ms) / cos theta_t
-    T medulla_scattering;  ///< sigma_ms / cos theta_t
-    T cortex[std::size_t(Channels)];    ///< sigma_ca / cos theta_t
-    T T_b[std::size_t(Channels)];       ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
+    T medulla_extinction;             ///< (sigma_ma + sigma_ms) / cos theta_t
+    T medulla_scattering;             ///< sigma_ms / cos theta_t
+    T cortex[std::size_t(Channels)];  ///< sigma_ca / cos theta_t
+    T T_b[std::size_t(Channels)];  ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
 };
 
 /// @param inverse_cos_t of one inclination or of several side by side
@@ -168,7 +168,8 @@ MEDULLA_HOT Energies<Channels, T> energies(const Path<T>& path, const Absorption
     T crossing[std::size_t(Channels)];  // optical length of a whole crossing
     for (int c = 0; c < Channels; ++c) crossing[c] = T(S(-2)) * (left[c] + left[std::size_t(Channels)]);
     exponentials(left);
-    const T m = left[std::size_t(Channels)], E = scattered ? absorbed(depth, left[std::size_t(Channels) + 1]) * survival : zero;
+    const T m = left[std::size_t(Channels)],
+            E = scattered ? absorbed(depth, left[std::size_t(Channels) + 1]) * survival : zero;
     const T third = passed * F * F;
     for (int c = 0; c < Channels; ++c) {
         const T q = left[c], through = (q * m) * (q * m);

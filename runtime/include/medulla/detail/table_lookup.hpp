@@ -88,7 +88,8 @@ MEDULLA_HOT Four row_density(const float* row, std::size_t step, Four w0, Four w
 }
 
 /// C^N at exit i [1 / radian].
-MEDULLA_HOT float azimuthal_density(const DenseTables& t, const TableRows& at, const ExitPlaces& places, int i) noexcept {
+MEDULLA_HOT float azimuthal_density(const DenseTables& t, const TableRows& at, const ExitPlaces& places,
+                                    int i) noexcept {
     const RowPoint exit = t.phi.at_place(std::uint32_t(places.stretch[i]), places.place[i]);
     const std::size_t step = t.azimuthal_step(), h_step = step * 2 * t.phi.rows, g_step = h_step * t.h.rows;
     const Four w0 = spread<0>(exit.weight), w1 = spread<1>(exit.weight), w2 = spread<2>(exit.weight),

@@ -18,6 +18,18 @@
 #define MEDULLA_HOT inline
 #endif
 
+/// What a lookup seldom needs, or what several callers share: never inlined, which keeps the code of a hit in the
+/// processor's instruction cache and compile times short.
+#if defined(__CUDACC__) || defined(__HIPCC__)
+#define MEDULLA_APART __host__ __device__ __noinline__ inline
+#elif defined(__GNUC__)
+#define MEDULLA_APART __attribute__((noinline)) inline
+#elif defined(_MSC_VER)
+#define MEDULLA_APART __declspec(noinline) inline
+#else
+#define MEDULLA_APART inline
+#endif
+
 // Two files compiled with different -m flags or with -ffast-math hold different code under the same inline function, of
 // which the linker keeps one: AVX code could end up in a program for every processor. So all of the runtime lives in an
 // inline namespace whose name says what it was compiled for. Users write medulla::; structs have one layout everywhere,

@@ -34,7 +34,7 @@ inline constexpr float wide_deviation = 0.8f;
 struct Cuts {
     int count = 0;
     float gamma[most_cuts];  ///< not set beyond count
-    MEDULLA_FN void insert(float x, float low, float high) noexcept {
+    MEDULLA_APART void insert(float x, float low, float high) noexcept {
         if (!(x > low && x < high) || count == most_cuts) return;
         int i = count++;
         for (; i > 0 && gamma[i - 1] > x; --i) gamma[i] = gamma[i - 1];
@@ -92,9 +92,12 @@ struct FarField : detail::FieldBase<Channels> {
     struct Means {
         float N[all_lobe_count][std::size_t(Channels)] = {}, share[all_lobe_count] = {};
     };
-    MEDULLA_FN Means means(float phi) const noexcept;
+    MEDULLA_FN Means means(float phi) const noexcept {
+        return detail::run_fused([&] { return integrate(phi); });
+    }
 
   private:
+    MEDULLA_FN Means integrate(float phi) const noexcept;
     MEDULLA_FN Evaluation<Channels> at(float theta_r, float cosine, float phi) const noexcept;
     MEDULLA_FN Evaluation<Channels> at(const detail::Polar& drawn) const noexcept {
         if (!(this->known.cosine > 0 && drawn.cosine > 0)) return {};
@@ -222,25 +225,22 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float 
     const WrappedGaussian<float> gaussian = field.azimuthal[p];
     const LobeCuts& cuts = field.cuts[p];
     const float s = gaussian.deviation, wide = reach * s;
-    const auto centre = [p](const Path<Four>& path) { return unscattered_centre(p, path.gamma_i, path.gamma_t); };
+    const bool whole = s > wide_deviation;
     float a = cuts.gamma[0];
     Exit at_a = {cuts.phi[0], cuts.slope[0]};
     for (int i = 1; i < cuts.count; ++i) {
         const float b = cuts.gamma[i];
         const Exit at_b = {cuts.phi[i], cuts.slope[i]};
+        const bool falling = at_b.phi < at_a.phi;
         float slope = greater(std::abs(at_a.slope), std::abs(at_b.slope));
         if (a < 0 && b > 0) slope = greater(slope, std::abs(exit_of(p, at.inverse_index, at.index_excess, 0.0f).slope));
-        if (s > wide_deviation) {
-            integrate_piece(field, p, a, b, slope / s, [&](const Path<Four>& path, Four weight) {
-                visit(path, weight, gaussian.pdf_of(Four(phi) - centre(path)));
-            });
-        } else {
-            const float low = std::fmin(at_a.phi, at_b.phi), high = greater(at_a.phi, at_b.phi);
-            // Every whole turn by which phi - wide .. phi + wide can meet low .. high.
-            const float first = std::ceil((low - wide - phi) * float(1 / (2 * pi)));
-            for (float y = phi + float(2 * pi) * first; y <= high + wide; y += float(2 * pi)) {
-                float ga = a, gb = b;
-                const bool falling = at_b.phi < at_a.phi;
+        // Every whole turn by which phi - wide .. phi + wide can meet the exits between the cuts.
+        const float low = std::fmin(at_a.phi, at_b.phi), high = greater(at_a.phi, at_b.phi);
+        float y = whole ? phi : phi + float(2 * pi) * std::ceil((low - wide - phi) * float(1 / (2 * pi)));
+        const float last = whole ? phi : high + wide;
+        for (; y <= last; y += float(2 * pi)) {
+            float ga = a, gb = b, steepest = slope;
+            if (!whole) {
                 const float enter = falling ? y + wide : y - wide, leave = falling ? y - wide : y + wide;
                 if (falling ? enter < at_a.phi : enter > at_a.phi)
                     ga = invert_exit(p, at.inverse_index, at.index_excess, enter, a, at_a, b, at_b, 0.02f * s);
@@ -251,13 +251,16 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float 
                 if (!(gb > ga)) continue;
                 const float sa = !(ga > a) ? at_a.slope : exit_of(p, at.inverse_index, at.index_excess, ga).slope;
                 const float sb = !(gb < b) ? at_b.slope : exit_of(p, at.inverse_index, at.index_excess, gb).slope;
-                const float steepest = ga < 0 && gb > 0 && p == 2 ? slope : greater(std::abs(sa), std::abs(sb));
-                // The image that is y alone: the others' tails are not within this reach of theirs.
-                integrate_piece(field, p, ga, gb, steepest / s, [&](const Path<Four>& path, Four weight) {
-                    const Four z = (Four(y) - centre(path)) * Four(gaussian.inverse);
-                    visit(path, weight, Four(within_reach * gaussian.peak) * exponential(Four(-0.5f) * z * z));
-                });
+                if (!(ga < 0 && gb > 0 && p == 2)) steepest = greater(std::abs(sa), std::abs(sb));
             }
+            // The image that is y alone: the others' tails are not within this reach of theirs.
+            integrate_piece(field, p, ga, gb, steepest / s, [&](const Path<Four>& path, Four weight) {
+                const Four delta = Four(y) - unscattered_centre(p, path.gamma_i, path.gamma_t);
+                const Four z = delta * Four(gaussian.inverse);
+                visit(path, weight,
+                      whole ? gaussian.pdf_of(delta)
+                            : Four(within_reach * gaussian.peak) * exponential(Four(-0.5f) * z * z));
+            });
         }
         a = b;
         at_a = at_b;
@@ -306,18 +309,24 @@ MEDULLA_FN void place_cuts(FarField<Channels>& field) noexcept {
     keep(2);
 }
 
-/// Energies at four offsets, with what the medulla's absorption leaves of scattered light.
+/// What the medulla's absorption leaves of scattered light at four offsets, by tables that know it.
 template <int Channels>
-MEDULLA_FN Energies<Channels, Four> energies_at(const FarField<Channels>& field, const Path<Four>& path) noexcept {
-    if (field.tables == nullptr || !field.tables->absorbs)
-        return energies(path, field.absorption, field.tables != nullptr);
+MEDULLA_APART Four survivals(const FarField<Channels>& field, Four h_inside) noexcept {
     float left[4];
     for (int i = 0; i < 4; ++i) {
         TableRows rows = field.rows;
-        set_offset(*field.tables, magnitude(lane(path.h_inside, i)) / field.kappa, rows);
+        set_offset(*field.tables, magnitude(lane(h_inside, i)) / field.kappa, rows);
         left[i] = survival_of(field.absorbed, survival_length(*field.tables, rows));
     }
-    return energies(path, field.absorption, true, four_at(left));
+    return four_at(left);
+}
+
+/// Energies at four offsets.
+template <int Channels>
+MEDULLA_FN Energies<Channels, Four> energies_at(const FarField<Channels>& field, const Path<Four>& path) noexcept {
+    const bool scattered = field.tables != nullptr;
+    return energies(path, field.absorption, scattered,
+                    scattered && field.tables->absorbs ? survivals(field, path.h_inside) : Four(1.0f));
 }
 
 /// Means over channels of each lobe's energy, over their sum: the lobes' probabilities at four offsets.
@@ -365,17 +374,19 @@ MEDULLA_FN void visit_scattered(const FarField<Channels>& field, Visit&& visit) 
     float low = a, high = b;
     if (edge_width < 1) {
         const float rim = float(pi / 2) - edge_width;
-        if (a < -rim) low = b < -rim ? b : -rim, visit_panel(field, a, low, edge, visit);
-        if (b > rim && b > low) high = low > rim ? low : rim, visit_panel(field, high, b, edge, visit);
+        if (a < -rim) low = b < -rim ? b : -rim;
+        if (b > rim && b > low) high = low > rim ? low : rim;
     }
     // A low-rank lobe is not quite its own mirror image at h = 0, where the side changes: no panel crosses it.
-    const float cut[3] = {low, low < 0 && high > 0 ? 0.0f : high, high};
-    for (int part = 0; part < 2 && cut[part + 1] > cut[part]; ++part) {
+    const float cut[5] = {a, low, low < 0 && high > 0 ? 0.0f : high, high, b};
+    for (int part = 0; part < 4; ++part) {
         const float length = cut[part + 1] - cut[part];
-        const int panels = 1 + int(length / per_panel);
+        if (!(length > 0)) continue;
+        const bool at_edge = part == 0 || part == 3;
+        const int panels = at_edge ? 1 : 1 + int(length / per_panel);
         for (int i = 0; i < panels; ++i) {
             const float step = length / float(panels), from = cut[part] + step * float(i);
-            visit_panel(field, from, i + 1 == panels ? cut[part + 1] : from + step, rule, visit);
+            visit_panel(field, from, i + 1 == panels ? cut[part + 1] : from + step, at_edge ? edge : rule, visit);
         }
     }
 }
@@ -455,7 +466,7 @@ MEDULLA_FN FarField<Channels> far_field(const Fibre<Channels>& fibre, Angles kno
 
 /// N of every lobe, and the density over phi of what is drawn from it, at phi [radians] from the known azimuth.
 template <int Channels>
-MEDULLA_FN typename FarField<Channels>::Means FarField<Channels>::means(float phi) const noexcept {
+MEDULLA_FN typename FarField<Channels>::Means FarField<Channels>::integrate(float phi) const noexcept {
     using namespace detail;
     Means m;
     for (int p = 0; p < 3; ++p) {

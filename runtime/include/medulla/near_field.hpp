@@ -197,7 +197,11 @@ struct NearField : detail::FieldBase<Channels> {
 
   private:
     MEDULLA_HOT detail::LobeDensities densities(float theta_r, float phi) const noexcept;
-    MEDULLA_HOT Evaluation<Channels> at(float theta_r, float cosine, float phi) const noexcept;
+    MEDULLA_HOT Evaluation<Channels> sum_of_lobes(float theta_r, float cosine, float phi) const noexcept;
+    /// Apart, since values and samples share it.
+    MEDULLA_FN Evaluation<Channels> at(float theta_r, float cosine, float phi) const noexcept {
+        return detail::run_fused([&] { return sum_of_lobes(theta_r, cosine, phi); });
+    }
     MEDULLA_HOT Evaluation<Channels> at(const detail::Polar& drawn) const noexcept {
         if (!(this->known.cosine > 0 && drawn.cosine > 0)) return {};
         const Angles between = detail::angles_between(this->known, drawn);
@@ -233,7 +237,8 @@ MEDULLA_HOT detail::LobeDensities NearField<Channels>::densities(float theta_r, 
 }
 
 template <int Channels>
-MEDULLA_HOT Evaluation<Channels> NearField<Channels>::at(float theta_r, float cosine, float phi) const noexcept {
+MEDULLA_HOT Evaluation<Channels> NearField<Channels>::sum_of_lobes(float theta_r, float cosine,
+                                                                   float phi) const noexcept {
     using namespace detail;
     const LobeDensities d = densities(theta_r, phi);
     const Four inverse(1 / cosine);

@@ -15,7 +15,7 @@ namespace detail {
 /// exp(x^2) erfc(x) for x >= 0, float precision: direct up to 5, then six terms of the asymptotic series
 /// (the seventh is 7e-7 of the sum at x = 5).
 template <class T>
-MEDULLA_FN T scaled_erfc(T x) noexcept {
+MEDULLA_APART T scaled_erfc(T x) noexcept {
     using std::erfc;
     using std::exp;
     if (x < T(5)) return exp(x * x) * erfc(x);
@@ -27,7 +27,7 @@ MEDULLA_FN T scaled_erfc(T x) noexcept {
 /// Mass of the standard normal over [near, from + w], near, w >= 0, divided by exp(-near^2 / 2). Kept scaled, a lobe
 /// whose centre lies far outside the interval still has a mass that is no underflow.
 template <class T>
-MEDULLA_FN T scaled_tail_mass(T from, T w) noexcept {
+MEDULLA_APART T scaled_tail_mass(T from, T w) noexcept {
     using std::exp;
     const T root_half = T(0.70710678118654752);
     const T to = from + w;
@@ -130,7 +130,7 @@ MEDULLA_FN float normal_quantile(float p, float q) noexcept {
 
 /// Draws theta from a truncated Gaussian whose centre lies outside: its distribution function inverted by Newton steps
 /// kept in a bracket. @param u in [0, 1]
-MEDULLA_FN float sample_tail(const TruncatedGaussian<float>& gaussian, float u) noexcept {
+MEDULLA_APART float sample_tail(const TruncatedGaussian<float>& gaussian, float u) noexcept {
     constexpr float edge = float(pi / 2);
     // d counts deviations from the edge into the interval.
     const bool mirrored = gaussian.origin > 0;
@@ -214,7 +214,7 @@ struct WrappedGaussian {
     }
     /// Theta series: sum of damping^(n^2) cos(n x); at deviation 1.2 the sixth term is 6e-12.
     template <class V>
-    MEDULLA_FN V harmonics(V x) const noexcept {
+    MEDULLA_APART V harmonics(V x) const noexcept {
         const auto half = sine_cosine(V(T(0.5)) * x);  // |x / 2| <= pi / 2
         const V c = half.cosine * half.cosine - half.sine * half.sine;
         const T d2 = damping * damping;
@@ -297,9 +297,7 @@ struct WrappedGaussians {
     /// Density at angles from the centres; lane 3 is 1 / (2 pi). @param delta four finite numbers
     MEDULLA_FN Four pdf(Four delta) const noexcept {
         if (narrow()) return peaks() * exponential(exponent(delta));
-        if (deviation[2] > 1.2f)
-            return Four((*this)[0].pdf(lane(delta, 0)), (*this)[1].pdf(lane(delta, 1)), (*this)[2].pdf(lane(delta, 2)),
-                        peak[3]);
+        if (deviation[2] > 1.2f) return one_by_one(delta);
         const Four turn = Four(float(2 * pi)) * aligned_four_at(inverse), z = wrapped(delta) * aligned_four_at(inverse),
                    p = z + turn, q = z - turn, third(0.0f, 0.0f, 0.0f, -1e3f);  // of lane 3 one image in three counts
         return peaks() * (exponential(Four(-0.5f) * z * z) + exponential(Four(-0.5f) * p * p + third) +
@@ -307,6 +305,10 @@ struct WrappedGaussians {
     }
 
   private:
+    MEDULLA_APART Four one_by_one(Four delta) const noexcept {
+        return Four((*this)[0].pdf(lane(delta, 0)), (*this)[1].pdf(lane(delta, 1)), (*this)[2].pdf(lane(delta, 2)),
+                    peak[3]);
+    }
     static MEDULLA_HOT Four wrapped(Four delta) noexcept {
         return delta - Four(float(2 * pi)) * nearest_integer(delta * Four(float(1 / (2 * pi))));
     }

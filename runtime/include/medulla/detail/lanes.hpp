@@ -334,13 +334,17 @@ MEDULLA_FN float sum_of(float a) noexcept { return a; }
 /// fused products. The compiler may fuse there, so the two differ by rounding.
 #if defined(MEDULLA_WIDE) && !defined(__FMA__)
 template <class F>
-__attribute__((target("avx2,fma"), flatten)) auto run_on_fma(const F& f) noexcept {
+__attribute__((target("avx2,fma"), flatten, noinline)) auto run_on_fma(const F& f) noexcept {
+    return f();
+}
+template <class F>
+MEDULLA_APART auto run_plain(const F& f) noexcept {
     return f();
 }
 template <class F>
 MEDULLA_FN auto run_fused(const F& f) noexcept {
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return run_on_fma(f);
-    return f();
+    return run_plain(f);
 }
 #else
 template <class F>

@@ -191,7 +191,7 @@ struct SplineSolve {
     double factor[most_solved_rows][2 * band + 1] =
         {};  ///< of row i at column i - band + k: L below, U from k = band on
 
-    MEDULLA_FN explicit SplineSolve(const AxisPlan& plan) noexcept : rows(plan.spans + 3) {
+    MEDULLA_APART explicit SplineSolve(const AxisPlan& plan) noexcept : rows(plan.spans + 3) {
         for (std::uint32_t i = 0; i < rows; ++i) {
             const double x = node_of(plan, i);
             std::uint32_t span = 0;
@@ -209,7 +209,7 @@ struct SplineSolve {
             }
     }
     /// Values at the nodes, `step` floats apart, become coefficients.
-    MEDULLA_FN void apply(float* x, std::size_t step) const noexcept {
+    MEDULLA_APART void apply(float* x, std::size_t step) const noexcept {
         double y[most_solved_rows];
         for (std::uint32_t i = 0; i < rows; ++i) {
             y[i] = double(x[i * step]);
@@ -224,7 +224,8 @@ struct SplineSolve {
 };
 
 /// The factors of a table contracted at (sigma, g), and at an absorption that goes with sigma.
-MEDULLA_FN void contract_node(const TableView& view, float sigma, float g, float absorption, float* weight) noexcept {
+MEDULLA_APART void contract_node(const TableView& view, float sigma, float g, float absorption,
+                                 float* weight) noexcept {
     start_contraction(view, weight);
     contract_axis(view, find_axis(view, Quantity::sigma), sigma, weight, weight);
     contract_axis(view, find_axis(view, Quantity::g), g, weight, weight);
@@ -233,7 +234,7 @@ MEDULLA_FN void contract_node(const TableView& view, float sigma, float g, float
 }
 
 /// Coefficients of a lobe over its exits. @param to of y >= 0 of the first row  @param step from exit to exit [floats]
-MEDULLA_FN void expand_row(const TableView& view, const float* weight, float* to, std::size_t step) noexcept {
+MEDULLA_APART void expand_row(const TableView& view, const float* weight, float* to, std::size_t step) noexcept {
     const std::uint32_t exits = view.layout.axes[view.parameter_axes()].spans + 3;
     exit_coefficients(view, weight, [&](std::uint32_t k, float positive, float negative) {
         to[step * k] = positive;
@@ -254,7 +255,7 @@ MEDULLA_FN void expand_rows(const TableView& view, const float* weight, float* t
 
 /// Divides a row by the integral of its positive part and writes its cumulated integrals. A signed low-rank sum with no
 /// positive integral is no density: it becomes even.
-MEDULLA_FN void finish_row(const SplineAxis& axis, float* row, std::uint32_t stride, float* blocks) noexcept {
+MEDULLA_APART void finish_row(const SplineAxis& axis, float* row, std::uint32_t stride, float* blocks) noexcept {
     const std::uint32_t count = block_count(axis), half = axis.blocks();
     const auto cumulate = [&] {
         float sum = 0;

@@ -43,7 +43,7 @@ struct Cubic {
 
 /// Integral over [a, b] of max(0, f): between its ends and where it is stationary a cubic is monotone, and there a sign
 /// change is bisected to the last bit.
-MEDULLA_FN float positive_integral(const Cubic& f, float a, float b) noexcept {
+MEDULLA_APART float positive_integral(const Cubic& f, float a, float b) noexcept {
     float end[4] = {a, b, b, b};
     int parts = 1;
     const float discriminant = f.p[2] * f.p[2] - 3 * f.p[1] * f.p[3];
@@ -75,13 +75,13 @@ MEDULLA_FN float positive_integral(const Cubic& f, float a, float b) noexcept {
 }
 
 /// Integral of a row's positive part over a span [stretches times density].
-MEDULLA_FN float span_mass(const SplineSpan& span, const RowCoefficients& row) noexcept {
+MEDULLA_APART float span_mass(const SplineSpan& span, const RowCoefficients& row) noexcept {
     if (row.positive()) return row.dot(span.integral);
     return positive_integral(Cubic(span, row), -span.half, span.half);
 }
 
 /// The same where the cubic is cut at 0, or steep.
-MEDULLA_FN float invert_cut_span(const Cubic& f, float half, float mass, float whole) noexcept {
+MEDULLA_APART float invert_cut_span(const Cubic& f, float half, float mass, float whole) noexcept {
     float low = -half, high = half, x = low + 2 * half * (whole > 0 ? mass / whole : 0.5f);
     for (int i = 0; i < 40 && high - low > 1e-6f * half; ++i) {
         const float error = positive_integral(f, -half, x) - mass;
@@ -150,8 +150,8 @@ MEDULLA_HOT float below_1(float u) noexcept { return lesser(u, 0.99999994f); }
 
 /// Draws an exit from the positive part of one row, within a block: exactly, by inverting its integral.
 /// @param row its first coefficient; from |y| to |y| they are `stride` floats apart
-MEDULLA_HOT float draw_in_block(const SplineAxis& axis, const float* row, std::uint32_t stride,
-                                BlockDraw block) noexcept {
+MEDULLA_HOT float place_in_block(const SplineAxis& axis, const float* row, std::uint32_t stride,
+                                 BlockDraw block) noexcept {
     const std::uint32_t half = axis.blocks(), below = std::uint32_t(block.block >= half);
     const std::uint32_t first = block.block - below * half;
     row += (below * axis.rows + first * block_spans) * stride;
@@ -176,6 +176,11 @@ MEDULLA_HOT float draw_in_block(const SplineAxis& axis, const float* row, std::u
     const SplineSpan& at = axis.span(first * block_spans + drawn.span);
     const float place = at.middle + invert_span(at, RowCoefficients(c + drawn.span, 1), drawn.rest, drawn.mass);
     return with_sign(greater(0.0f, lesser(place, axis.end)) * axis.inverse_scale, 0.5f - float(below));
+}
+/// The same, apart, since both angles share it.
+MEDULLA_FN float invert_block(const SplineAxis& axis, const float* row, std::uint32_t stride,
+                              BlockDraw block) noexcept {
+    return run_fused([&] { return place_in_block(axis, row, stride, block); });
 }
 
 }  // namespace detail

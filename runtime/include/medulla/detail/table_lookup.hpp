@@ -162,8 +162,8 @@ MEDULLA_HOT float draw_azimuth(const DenseTables& t, const TableRows& at, float 
     const std::uint32_t row = g * t.h.rows + h, step = t.azimuthal_step();
     const float* const cumulated =
         t.floats(t.azimuthal_blocks) + std::size_t(row * t.sigma.rows + sigma) * block_count(t.phi);
-    return draw_in_block(t.phi, t.floats(t.azimuthal) + std::size_t(row * 2 * t.phi.rows) * step + sigma, step,
-                         draw_block(t.phi, cumulated, below_1(u)));
+    return invert_block(t.phi, t.floats(t.azimuthal) + std::size_t(row * 2 * t.phi.rows) * step + sigma, step,
+                        draw_block(t.phi, cumulated, below_1(u)));
 }
 
 /// What of a draw of theta_r is known before phi: a row of each side, and the block there.
@@ -192,8 +192,8 @@ MEDULLA_HOT LongitudeDraw begin_longitude(const DenseTables& t, const TableRows&
 /// theta_r, as seen from theta_i >= 0 [radians]. @param forwardness |phi| / pi
 MEDULLA_HOT float finish_longitude(const DenseTables& t, const LongitudeDraw& draw, float forwardness) noexcept {
     const auto forward = std::uint32_t(draw.side < forwardness);
-    return draw_in_block(t.theta_r, draw.row + forward * t.longitudinal_side(), t.longitudinal_step(),
-                         draw.block[forward]);
+    return invert_block(t.theta_r, draw.row + forward * t.longitudinal_side(), t.longitudinal_step(),
+                        draw.block[forward]);
 }
 
 /// What -log(survival) is per absorption, at one offset.

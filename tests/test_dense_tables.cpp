@@ -70,19 +70,24 @@ double scattered_error(const Fibre<3>& fibre, double theta_i, double h_medulla) 
 
 TEST_CASE("dense tables say what the factors say, over ranges of any width", "[bcsdf]") {
     const char* wanted = std::getenv("MEDULLA_DENSE_CASES");  // more of them by hand
-    const int cases = wanted ? std::atoi(wanted) : 24;
+    const int cases = wanted ? std::atoi(wanted) : 30;
     std::mt19937 random(31);
     std::uniform_real_distribution<float> u(0, 1);
-    // Widths of ranges about a material: itself, a coat with textures, half of the pack, all of it.
+    // Ranges about a material: its own, with sigma tied to theta_i and free, a coat's with textures, half of the pack,
+    // all of it.
     struct Width {
         const char* name;
         float g, sigma;
         double worst = 0;
-    } widths[] = {{"own", 0, 1}, {"textured", 0.1f, 1.5f}, {"wide", 0.4f, 4}, {"whole pack", 2, 1e6f}};
+    } widths[] = {{"one material", 0, 1},
+                  {"its ranges", 0, 1},
+                  {"textured", 0.1f, 1.5f},
+                  {"wide", 0.4f, 4},
+                  {"whole pack", 2, 1e6f}};
     const OwnedTables whole(shipped(), {-0.99f, 0.99f, 0, 1e6f, 0});
     REQUIRE(whole.status() == TablesStatus::ok);
     for (int i = 0; i < cases; ++i) {
-        Width& width = widths[i % 4];
+        Width& width = widths[i % 5];
         FurParameters<3> p;
         p.eta = 1.2f + 0.6f * u(random), p.kappa = 0.4f + 0.6f * u(random), p.layers = 1;
         p.g = whole->ranges.g_low + (whole->ranges.g_high - whole->ranges.g_low) * u(random);
@@ -94,11 +99,14 @@ TEST_CASE("dense tables say what the factors say, over ranges of any width", "[b
         // The material lies anywhere in the range.
         const float g_low = own.g_low - width.g * u(random),
                     sigma_low = own.sigma_low / std::pow(width.sigma, u(random));
-        const TableRanges ranges = {g_low, g_low + width.g > own.g_high ? g_low + width.g : own.g_high, sigma_low,
-                                    std::max(own.sigma_high, sigma_low * width.sigma), 0};
-        const bool all = i % 4 == 3;
+        TableRanges ranges = {g_low,     g_low + width.g > own.g_high ? g_low + width.g : own.g_high,
+                              sigma_low, std::max(own.sigma_high, sigma_low * width.sigma),
+                              0,         0};
+        if (i % 5 == 0) ranges = own;
+        const bool all = i % 5 == 4;
         const OwnedTables tables(shipped(), all ? TableRanges{0, 0, 1, 1, 0} : ranges);
         REQUIRE(tables.status() == TablesStatus::ok);
+        REQUIRE(tables->one_material == (i % 5 == 0));
         const Fibre<3> fibre = make_fibre(p, all ? whole.get() : tables.get());
         REQUIRE(fibre.status == FibreStatus::ok);
         for (int k = 0; k < 3; ++k) {
@@ -185,6 +193,34 @@ TEST_CASE("joined ranges cover both materials", "[bcsdf]") {
             CHECK(scattered_error(make_fibre(p, tables.get()), theta_i, 0.4) < 3e-4);
     }
     CHECK(make_fibre(parameters_of<3>(*find_preset("raccoon")), tables.get()).status == FibreStatus::beyond_tables);
+}
+
+TEST_CASE("tables of one material are small, and are another's only by saying so", "[bcsdf]") {
+    FurParameters<3> p = parameters_of<3>(*find_preset("cat"));
+    const TableRanges one = ranges_of(p);
+    TableRanges free = one;
+    free.eta = 0;
+    const OwnedTables tables(shipped(), one), wide(shipped(), free);
+    CHECK(tables->one_material == 1);
+    CHECK(wide->one_material == 0);
+    CHECK(double(tables.bytes()) < 0.6 * double(wide.bytes()));
+    CHECK(OwnedTables(shipped(), join(one, one))->one_material == 1);
+    CHECK(OwnedTables(shipped(), join(one, ranges_of(parameters_of<3>(*find_preset("mouse")))))->one_material == 0);
+    const auto status = [&](auto&& change) {
+        FurParameters<3> q = p;
+        change(q);
+        return make_fibre(q, tables.get()).status;
+    };
+    CHECK(status([](FurParameters<3>&) {}) == FibreStatus::ok);
+    CHECK(status([](FurParameters<3>& q) { q.sigma_ca[0] = 3, q.beta_m = 0.1f, q.layers = 2, q.alpha = 0.01f; }) ==
+          FibreStatus::ok);
+    CHECK(status([](FurParameters<3>& q) { q.kappa *= 1.01f; }) == FibreStatus::beyond_tables);
+    CHECK(status([](FurParameters<3>& q) { q.kappa *= 0.99f; }) == FibreStatus::beyond_tables);
+    CHECK(status([](FurParameters<3>& q) { q.sigma_ms *= 1.01f; }) == FibreStatus::beyond_tables);
+    CHECK(status([](FurParameters<3>& q) { q.g += 0.01f; }) == FibreStatus::beyond_tables);
+    CHECK(status([](FurParameters<3>& q) { q.eta += 0.001f; }) == FibreStatus::beyond_tables);
+    CHECK(status([](FurParameters<3>& q) { q.eta -= 0.001f; }) == FibreStatus::beyond_tables);
+    CHECK(status([](FurParameters<3>& q) { q.kappa *= 0.5f, q.sigma_ms *= 2; }) == FibreStatus::ok);
 }
 
 TEST_CASE("every row of dense tables integrates to 1, what is cut at 0 and all", "[bcsdf]") {

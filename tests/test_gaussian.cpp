@@ -18,7 +18,7 @@ TEST_CASE("Gaussians of four lobes at a time are what they are one by one", "[bc
         float centre[4], deviation[4];
         for (int p = 0; p < 4; ++p) centre[p] = shift[p] * alpha - theta_i, deviation[p] = rough[p] * beta;
         const auto M = truncated_gaussians(four_at(centre), four_at(deviation));
-        const WrappedGaussians D = wrapped_gaussians(beta, 1.4f * beta, 1.7f * beta);
+        const WrappedGaussians D = wrapped_gaussians(beta);
         const float phi = 20 * (u(random) - 0.5f);
         const Four delta = Four(phi) - four_at(centre);
         const Four m = M.pdf(theta_r), d = D.pdf(delta), joint = joint_pdf(M, D, theta_r, delta);

@@ -86,15 +86,21 @@ class DenseReader : public Medulla {
     double longitudinal(Side side, double sigma, double g, double theta_i, double theta_r) const override {
         const Point of_g = g_at(g), of_sigma = at(0, Quantity::sigma, sigma),
                     of_theta = at(3, Quantity::theta_i, theta_i), exit = at(5, Quantity::theta_r, std::abs(theta_r));
+        const std::uint32_t lines = t_.longitudinal_side();
+        const float* rows = t_.floats(t_.longitudinal) + (side == Side::forward ? lines : 0);
         double sum = 0;
+        for (std::uint32_t j = 0; t_.one_material && j < 4; ++j)
+            sum += of_theta.w[j] *
+                   spline(exit, rows + (theta_r < 0 ? 1 : 0) * t_.theta_r.rows * 2 * lines + of_theta.first + j,
+                          2 * lines);
+        if (t_.one_material) return sum;
         for (std::uint32_t i = 0; i < of_g.count; ++i)
             for (std::uint32_t j = 0; j < 4; ++j)
                 for (std::uint32_t k = 0; k < 4; ++k) {
                     const std::size_t plane = std::size_t(of_g.first + i) * t_.theta_i.rows + of_theta.first + j;
-                    const float* row = t_.floats(t_.longitudinal) +
-                                       (plane * 2 + (theta_r < 0 ? 1 : 0)) * t_.theta_r.rows * 2 * t_.sigma.rows +
-                                       (side == Side::forward ? t_.sigma.rows : 0) + of_sigma.first + k;
-                    sum += of_g.w[i] * of_theta.w[j] * of_sigma.w[k] * spline(exit, row, 2 * t_.sigma.rows);
+                    const float* row =
+                        rows + (plane * 2 + (theta_r < 0 ? 1 : 0)) * t_.theta_r.rows * 2 * lines + of_sigma.first + k;
+                    sum += of_g.w[i] * of_theta.w[j] * of_sigma.w[k] * spline(exit, row, 2 * lines);
                 }
         return sum;
     }

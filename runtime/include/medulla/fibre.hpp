@@ -104,8 +104,10 @@ MEDULLA_FN Fibre<Channels> make_fibre(const FurParameters<Channels>& parameters,
     const TableRanges& r = tables->ranges;
     const float radius = p.sigma_ms * p.kappa, slack = 1e-4f;
     const float longest2 = p.eta * p.eta * radius * radius, span2 = (p.eta - 1) * (p.eta + 1);
-    const bool inside = p.g >= r.g_low - slack && p.g <= r.g_high + slack && radius >= r.sigma_low * (1 - slack) &&
-                        longest2 <= r.sigma_high * r.sigma_high * (1 + slack) * span2;
+    bool inside = p.g >= r.g_low - slack && p.g <= r.g_high + slack && radius >= r.sigma_low * (1 - slack) &&
+                  longest2 <= r.sigma_high * r.sigma_high * (1 + slack) * span2;
+    if (tables->one_material)
+        inside = inside && radius <= r.sigma_low * (1 + slack) && detail::within(p.eta - r.eta, slack);
     if (!inside && f.status == FibreStatus::ok) f.status = FibreStatus::beyond_tables;
     return f;
 }

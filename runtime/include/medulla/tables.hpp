@@ -3,7 +3,8 @@
 // too. Rests on lookup.hpp, whose contractions from factors are the reference implementation.
 //
 // Each table is a tensor of cubic B-spline coefficients: C^N over (g, sigma, h; phi), C^M over (g, sigma, theta_i;
-// theta_r) for the backward and the forward side. A row is one spline over the exit direction. What a lookup returns is
+// theta_r) for the backward and the forward side, or, of one material, over (theta_i; theta_r) alone, since its sigma
+// follows from theta_i. A row is one spline over the exit direction. What a lookup returns is
 // sum over rows of w max(0, row(y)), weights w >= 0 of sum 1 and rows whose positive part integrates to 1: a density of
 // integral 1 that can be drawn from exactly, by picking a row by its weight and inverting it. docs/bcsdf.md, 'Dense
 // tables', has the errors.
@@ -25,6 +26,9 @@ struct TableRanges {
     float g_low = 0, g_high = 0;          ///< mean cosine of the phase function [1], in (-1, 1)
     float sigma_low = 0, sigma_high = 0;  ///< optical radius sigma_ms kappa / cos theta_t [1], >= 0
     float absorption = 0;  ///< sigma_ma / sigma_ms [1]; read where the pack has an axis of absorption alone
+    /// Of one material its index [1]: the optical radius at theta_i is then sigma_low / cos theta_t, which leaves C^M a
+    /// table over (theta_i; theta_r). Anything else, such as 0, and ends that are not one material's leave sigma free.
+    float eta = 0;
 };
 
 /// The ranges that one material needs: its g, and sigma_ms kappa to sigma_ms kappa eta / sqrt(eta^2 - 1) over all
@@ -33,14 +37,17 @@ template <int Channels>
 MEDULLA_FN TableRanges ranges_of(const FurParameters<Channels>& p) noexcept {
     const float radius = p.sigma_ms * p.kappa;
     const float longest = p.eta / std::sqrt((p.eta - 1) * (p.eta + 1));  // 1 / cos theta_t at grazing
-    return {p.g, p.g, radius, radius * longest, p.sigma_ms > 0 ? p.sigma_ma / p.sigma_ms : 0.0f};
+    return {p.g, p.g, radius, radius * longest, p.sigma_ms > 0 ? p.sigma_ma / p.sigma_ms : 0.0f, p.eta};
 }
 /// The ranges that cover both. The absorption is a's: where the pack has an axis of it, materials that share tables
 /// have the same sigma_ma / sigma_ms.
 MEDULLA_FN TableRanges join(const TableRanges& a, const TableRanges& b) noexcept {
-    return {a.g_low < b.g_low ? a.g_low : b.g_low, a.g_high > b.g_high ? a.g_high : b.g_high,
+    return {a.g_low < b.g_low ? a.g_low : b.g_low,
+            a.g_high > b.g_high ? a.g_high : b.g_high,
             a.sigma_low < b.sigma_low ? a.sigma_low : b.sigma_low,
-            a.sigma_high > b.sigma_high ? a.sigma_high : b.sigma_high, a.absorption};
+            a.sigma_high > b.sigma_high ? a.sigma_high : b.sigma_high,
+            a.absorption,
+            a.eta == b.eta ? a.eta : 0.0f};
 }
 
 /// Dense tables as they lie in memory; made by make_tables. Arrays follow the struct.
@@ -51,20 +58,26 @@ struct DenseTables {
     std::uint32_t absorbs;  ///< whether survival lengths are there
     detail::SplineAxis sigma, g, h, theta_i, phi, theta_r;
     std::uint32_t g_rows;            ///< 1: g is one number
+    std::uint32_t one_material;      ///< 1: C^M has lines of theta_i in place of sigma, and none of g
     std::uint32_t azimuthal;         ///< bytes from here: float[g][h][phi >= 0, phi < 0][row of |phi|][sigma]
     std::uint32_t azimuthal_blocks;  ///< float[g][h][sigma][blocks]: cumulated integrals of eight spans each
-    std::uint32_t longitudinal;      ///< float[g][theta_i][theta_r >= 0, < 0][row of |theta_r|][back, forward][sigma]
-    std::uint32_t longitudinal_blocks;  ///< float[g][theta_i][back, forward][sigma][blocks]
-    std::uint32_t survival;             ///< float[g][h][sigma]
+    /// float[g][theta_i][theta_r >= 0, < 0][row of |theta_r|][back, forward][sigma], or of one material
+    /// float[theta_r >= 0, < 0][row of |theta_r|][back, forward][theta_i]
+    std::uint32_t longitudinal;
+    std::uint32_t
+        longitudinal_blocks;  ///< float[g][theta_i][back, forward][sigma][blocks], or [back, forward][theta_i][blocks]
+    std::uint32_t survival;   ///< float[g][h][sigma]
 
     MEDULLA_HOT const float* floats(std::uint32_t offset) const noexcept {
         return reinterpret_cast<const float*>(reinterpret_cast<const char*>(this) + offset);
     }
     /// Floats from one number to the next along an axis.
     MEDULLA_HOT std::uint32_t azimuthal_step() const noexcept { return sigma.rows; }
-    MEDULLA_HOT std::uint32_t longitudinal_step() const noexcept { return 2 * sigma.rows; }
+    MEDULLA_HOT std::uint32_t longitudinal_step() const noexcept { return 2 * longitudinal_side(); }
+    MEDULLA_HOT std::uint32_t longitudinal_side() const noexcept { return one_material ? theta_i.rows : sigma.rows; }
+    MEDULLA_HOT std::uint32_t longitudinal_planes() const noexcept { return one_material ? 1 : g_rows * theta_i.rows; }
 };
-static_assert(sizeof(DenseTables) == 280, "one layout everywhere");
+static_assert(sizeof(DenseTables) == 288, "one layout everywhere");
 inline constexpr std::uint64_t tables_magic = 0x314c42544c44454du;  // "MEDLTBL1"
 
 enum class TablesStatus {

@@ -1,7 +1,8 @@
 // make_tables: where each array of dense tables lies, and what is in it. Rests on lookup.hpp's contractions.
 //
 // Along h, theta_i and the exits rows are the pack's own coefficients. Along g and sigma axes are made to measure: the
-// factors are contracted at as many nodes as there are rows, and the rows are the spline through them.
+// factors are contracted at as many nodes as there are rows, and the rows are the spline through them. So it is along
+// theta_i where sigma follows from it.
 #pragma once
 
 #include <cmath>
@@ -17,8 +18,9 @@ namespace medulla {
 inline namespace MEDULLA_TARGET {
 namespace detail {
 
-/// Rows of a made-to-measure axis at most: the system that is solved for them stands on the stack.
-inline constexpr std::uint32_t most_range_rows = 40;
+/// Rows of a made-to-measure axis at most, and of theta_i where sigma follows from it: the system that is solved for
+/// them stands on the stack.
+inline constexpr std::uint32_t most_range_rows = 40, most_solved_rows = 128;
 
 /// The axis of g: lobes are analytic in g up to |g| = 1, and steps are a share of the distance to it. Steps of both
 /// axes are such that lobes differ from the factors' by a relative L2 of 3e-4 at most over a coat's ranges, and of 6e-4
@@ -41,6 +43,24 @@ struct TablesPlan {
     TableView azimuthal, side[2], survival;
     float g[most_range_rows] = {}, sigma[most_range_rows] = {};  ///< nodes
 };
+
+/// The optical radius of one material at theta_i.
+MEDULLA_FN double sigma_at(const TableRanges& r, double theta_i) noexcept {
+    const double sine = std::sin(theta_i) / double(r.eta), cosine = std::sqrt((1 - sine) * (1 + sine));
+    const double sigma = double(r.sigma_low) / cosine;
+    return sigma < double(r.sigma_high) ? sigma : double(r.sigma_high);
+}
+/// Whether ranges are those of one material, and no wider.
+MEDULLA_FN bool of_one_material(const TableRanges& r) noexcept {
+    if (!(r.eta > 1 && within(r.eta, 1e9f) && r.g_low == r.g_high)) return false;
+    const double high = double(r.sigma_low) * double(r.eta) / std::sqrt((double(r.eta) - 1) * (double(r.eta) + 1));
+    return std::abs(double(r.sigma_high) - high) <= 1e-5 * high;
+}
+/// Knots beyond either end of an axis repeat it: the splines are the same, and the nodes of all rows lie within.
+MEDULLA_FN void clamp_ends(AxisPlan& plan) noexcept {
+    plan.t[0] = plan.t[1] = plan.lower();
+    plan.t[plan.spans + 3] = plan.t[plan.spans + 4] = plan.upper();
+}
 
 /// Parameter axis of a table by what it measures; its axis_count if there is none.
 MEDULLA_FN std::uint32_t find_axis(const TableView& view, Quantity quantity) noexcept {
@@ -117,6 +137,8 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     plan_axis(axis_of(plan.side[0], Quantity::theta_i), plan.axis[3]);
     plan_axis(axis_of(plan.azimuthal, Quantity::phi), plan.axis[4]);
     plan_axis(axis_of(plan.side[0], Quantity::theta_r), plan.axis[5]);
+    t.one_material = of_one_material(asked) && plan.axis[3].spans + 3 <= most_solved_rows ? 1u : 0u;
+    if (t.one_material) clamp_ends(plan.axis[3]);
     if (!(std::abs(plan.axis[2].lower()) < 1e-6) || !(std::abs(plan.axis[3].lower()) < 1e-6) ||
         !(plan.axis[3].upper() > 0.999999))
         return fail(TablesStatus::bad_axes);
@@ -146,10 +168,11 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     }
     for (std::uint32_t i = 0; i < t.g_rows; ++i) plan.g[i] = one_g ? r.g_low : float(node_of(plan.axis[1], i));
     const std::uint64_t planes = std::uint64_t(t.g_rows) * t.sigma.rows;
-    const std::uint64_t floats[5] = {planes * t.h.rows * 2 * t.phi.rows, planes * t.h.rows * block_count(t.phi),
-                                     planes * t.theta_i.rows * 4 * t.theta_r.rows,
-                                     planes * t.theta_i.rows * 2 * block_count(t.theta_r),
-                                     plan.survival ? planes * t.h.rows : 0};
+    const std::uint64_t floats[5] = {
+        planes * t.h.rows * 2 * t.phi.rows, planes * t.h.rows * block_count(t.phi),
+        std::uint64_t(t.longitudinal_planes()) * 2 * t.theta_r.rows * t.longitudinal_step(),
+        std::uint64_t(t.longitudinal_planes()) * t.longitudinal_step() * block_count(t.theta_r),
+        plan.survival ? planes * t.h.rows : 0};
     std::uint64_t all = at;
     for (const std::uint64_t n : floats) all += 64 + 4 * n;
     if (all > 0x7fffffffu) return fail(TablesStatus::too_large);
@@ -159,56 +182,44 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     t.bytes = at + 16 * t.longitudinal_step();  // draws read four rows past the last
 }
 
-/// Inverse of the matrix of a spline's weights at its nodes: coefficients from values. Gauss-Jordan with pivots; the
-/// matrix is banded and, as nodes lie where their row weighs most, never singular.
+/// A spline through values at its nodes: coefficients from values. The matrix of weights is banded and totally
+/// positive, as each node lies where its row weighs most, and such a system is eliminated without pivots (de Boor 1978,
+/// XIII).
 struct SplineSolve {
+    static constexpr int band = 3;  ///< diagonals to either side
     std::uint32_t rows;
-    double inverse[most_range_rows][most_range_rows];
+    double factor[most_solved_rows][2 * band + 1] =
+        {};  ///< of row i at column i - band + k: L below, U from k = band on
 
-    MEDULLA_FN explicit SplineSolve(const AxisPlan& plan) noexcept : rows(plan.spans + 3), inverse{} {
-        double a[most_range_rows][most_range_rows] = {};
+    MEDULLA_FN explicit SplineSolve(const AxisPlan& plan) noexcept : rows(plan.spans + 3) {
         for (std::uint32_t i = 0; i < rows; ++i) {
             const double x = node_of(plan, i);
             std::uint32_t span = 0;
             while (span + 1 < plan.spans && x >= plan.knot(std::int32_t(span) + 1)) ++span;
             double w[4];
             plan.weights(span, x, w);
-            for (std::uint32_t k = 0; k < 4; ++k) a[i][span + k] = w[k];
-            inverse[i][i] = 1;
+            for (std::uint32_t k = 0; k < 4; ++k) factor[i][span + k + band - i] = w[k];
         }
-        for (std::uint32_t c = 0; c < rows; ++c) {
-            std::uint32_t pivot = c;
-            for (std::uint32_t i = c + 1; i < rows; ++i)
-                if (std::abs(a[i][c]) > std::abs(a[pivot][c])) pivot = i;
-            for (std::uint32_t k = 0; k < rows; ++k) {
-                const double x = a[c][k], y = inverse[c][k];
-                a[c][k] = a[pivot][k];
-                a[pivot][k] = x;
-                inverse[c][k] = inverse[pivot][k];
-                inverse[pivot][k] = y;
+        for (std::uint32_t c = 0; c < rows; ++c)
+            for (std::uint32_t i = c + 1; i < rows && i <= c + band; ++i) {
+                double& below = factor[i][c + band - i];
+                below /= factor[c][band];
+                for (std::uint32_t k = c + 1; k < rows && k <= c + band; ++k)
+                    factor[i][k + band - i] -= below * factor[c][k + band - c];
             }
-            const double factor = 1 / a[c][c];
-            for (std::uint32_t k = 0; k < rows; ++k) {
-                a[c][k] *= factor;
-                inverse[c][k] *= factor;
-            }
-            for (std::uint32_t i = 0; i < rows; ++i) {
-                const double by = i == c ? 0 : a[i][c];
-                for (std::uint32_t k = 0; k < rows; ++k) {
-                    a[i][k] -= by * a[c][k];
-                    inverse[i][k] -= by * inverse[c][k];
-                }
-            }
-        }
     }
     /// Values at the nodes, `step` floats apart, become coefficients.
     MEDULLA_FN void apply(float* x, std::size_t step) const noexcept {
-        double y[most_range_rows];
+        double y[most_solved_rows];
         for (std::uint32_t i = 0; i < rows; ++i) {
-            y[i] = 0;
-            for (std::uint32_t k = 0; k < rows; ++k) y[i] += inverse[i][k] * double(x[k * step]);
+            y[i] = double(x[i * step]);
+            for (std::uint32_t k = i > band ? i - band : 0; k < i; ++k) y[i] -= factor[i][k + band - i] * y[k];
         }
-        for (std::uint32_t i = 0; i < rows; ++i) x[i * step] = float(y[i]);
+        for (std::uint32_t i = rows; i-- > 0;) {
+            for (std::uint32_t k = i + 1; k < rows && k <= i + band; ++k) y[i] -= factor[i][k + band - i] * y[k];
+            y[i] /= factor[i][band];
+            x[i * step] = float(y[i]);
+        }
     }
 };
 
@@ -221,19 +232,23 @@ MEDULLA_FN void contract_node(const TableView& view, float sigma, float g, float
     if (k < view.layout.axis_count) contract_axis(view, k, sigma * absorption, weight, weight);
 }
 
-/// Coefficients of a lobe over its exits, for every row of its last parameter axis.
-/// @param to of y >= 0 of the first row  @param step from exit to exit  @param row_step from row to row [floats]
+/// Coefficients of a lobe over its exits. @param to of y >= 0 of the first row  @param step from exit to exit [floats]
+MEDULLA_FN void expand_row(const TableView& view, const float* weight, float* to, std::size_t step) noexcept {
+    const std::uint32_t exits = view.layout.axes[view.parameter_axes()].spans + 3;
+    exit_coefficients(view, weight, [&](std::uint32_t k, float positive, float negative) {
+        to[step * k] = positive;
+        to[step * (exits + k)] = negative;
+    });
+}
+/// The same for every row of its last parameter axis.
+/// @param row_step from row to row [floats]
 MEDULLA_FN void expand_rows(const TableView& view, const float* weight, float* to, std::size_t step,
                             std::size_t row_step) noexcept {
-    const std::uint32_t last = view.parameter_axes() - 1, rows = view.layout.axes[last].spans + 3,
-                        exits = view.layout.axes[last + 1].spans + 3;
+    const std::uint32_t last = view.parameter_axes() - 1, rows = view.layout.axes[last].spans + 3;
     alignas(32) float at[max_rank];
     for (std::uint32_t j = 0; j < rows; ++j, to += row_step) {
         scale_by_row(view, last, j, weight, at);
-        exit_coefficients(view, at, [&](std::uint32_t k, float positive, float negative) {
-            to[step * k] = positive;
-            to[step * (exits + k)] = negative;
-        });
+        expand_row(view, at, to, step);
     }
 }
 
@@ -266,17 +281,17 @@ MEDULLA_FN void fill_tables(const TablesPlan& plan, DenseTables& t) noexcept {
     const auto floats = [&](std::uint32_t offset) { return const_cast<float*>(t.floats(offset)); };
     float *azimuthal = floats(t.azimuthal), *longitudinal = floats(t.longitudinal), *survival = floats(t.survival);
     const std::size_t h_step = std::size_t(2) * t.phi.rows * sigmas, g_azimuthal = t.h.rows * h_step,
-                      theta_step = std::size_t(4) * t.theta_r.rows * sigmas,
-                      g_longitudinal = t.theta_i.rows * theta_step, g_survival = std::size_t(t.h.rows) * sigmas;
+                      plane = std::size_t(2) * t.theta_r.rows * t.longitudinal_step(),
+                      g_longitudinal = t.theta_i.rows * plane, g_survival = std::size_t(t.h.rows) * sigmas;
     alignas(32) float weight[max_rank];
     for (std::uint32_t j = 0; j < gs; ++j) {
         for (std::uint32_t i = 0; i < sigmas; ++i) {
             contract_node(plan.azimuthal, plan.sigma[i], plan.g[j], t.ranges.absorption, weight);
             expand_rows(plan.azimuthal, weight, azimuthal + j * g_azimuthal + i, sigmas, h_step);
-            for (std::uint32_t side = 0; side < 2; ++side) {
+            for (std::uint32_t side = 0; side < 2 && !t.one_material; ++side) {
                 contract_node(plan.side[side], plan.sigma[i], plan.g[j], 0, weight);
                 expand_rows(plan.side[side], weight, longitudinal + j * g_longitudinal + side * sigmas + i,
-                            std::size_t(2) * sigmas, theta_step);
+                            std::size_t(2) * sigmas, plane);
             }
             if (!plan.survival) continue;
             contract_node(plan.survival, plan.sigma[i], plan.g[j], t.ranges.absorption, weight);
@@ -288,9 +303,21 @@ MEDULLA_FN void fill_tables(const TablesPlan& plan, DenseTables& t) noexcept {
     const auto solve = [](const SplineSolve& system, float* x, std::size_t step, std::size_t count, std::size_t next) {
         for (std::size_t k = 0; k < count; ++k) system.apply(x + k * next, step);
     };
+    for (std::uint32_t i = 0; t.one_material && i < t.theta_i.rows; ++i) {
+        const float theta = from_spline_coordinate(Quantity::theta_i, float(node_of(plan.axis[3], i)));
+        for (std::uint32_t side = 0; side < 2; ++side) {
+            const TableView& view = plan.side[side];
+            contract_node(view, float(sigma_at(t.ranges, double(theta))), plan.g[0], 0, weight);
+            contract_axis(view, find_axis(view, Quantity::theta_i), theta, weight, weight);
+            expand_row(view, weight, longitudinal + side * t.theta_i.rows + i, t.longitudinal_step());
+        }
+    }
     const SplineSolve along_sigma(plan.axis[0]);
     solve(along_sigma, azimuthal, 1, gs * g_azimuthal / sigmas, sigmas);
-    solve(along_sigma, longitudinal, 1, gs * g_longitudinal / sigmas, sigmas);
+    if (t.one_material)
+        solve(SplineSolve(plan.axis[3]), longitudinal, 1, plane / t.theta_i.rows, t.theta_i.rows);
+    else
+        solve(along_sigma, longitudinal, 1, gs * g_longitudinal / sigmas, sigmas);
     if (plan.survival) solve(along_sigma, survival, 1, gs * g_survival / sigmas, sigmas);
     if (gs > 1) {
         const SplineSolve along_g(plan.axis[1]);
@@ -303,9 +330,9 @@ MEDULLA_FN void fill_tables(const TablesPlan& plan, DenseTables& t) noexcept {
         for (std::uint32_t i = 0; i < sigmas; ++i, blocks += block_count(t.phi))
             finish_row(t.phi, azimuthal + row * h_step + i, t.azimuthal_step(), blocks);
     blocks = floats(t.longitudinal_blocks);
-    for (std::size_t row = 0; row < std::size_t(gs) * t.theta_i.rows; ++row)
-        for (std::uint32_t i = 0; i < 2 * sigmas; ++i, blocks += block_count(t.theta_r))
-            finish_row(t.theta_r, longitudinal + row * theta_step + i, t.longitudinal_step(), blocks);
+    for (std::size_t row = 0; row < t.longitudinal_planes(); ++row)
+        for (std::uint32_t i = 0; i < t.longitudinal_step(); ++i, blocks += block_count(t.theta_r))
+            finish_row(t.theta_r, longitudinal + row * plane + i, t.longitudinal_step(), blocks);
 }
 
 }  // namespace detail

@@ -61,7 +61,9 @@ MEDULLA_HOT void set_inclination(const DenseTables& t, float sigma, float theta,
     set_row(t.sigma, std::sqrt(sigma), at.sigma_first, at.sigma);
     set_row(t.theta_i, chord_coordinate(magnitude(theta) * float(2 / pi)), at.theta_first, at.theta_i);
     at.longitudinal =
-        (at.g_first * t.theta_i.rows + at.theta_first) * 2 * t.theta_r.rows * t.longitudinal_step() + at.sigma_first;
+        t.one_material ? at.theta_first
+                       : (at.g_first * t.theta_i.rows + at.theta_first) * 2 * t.theta_r.rows * t.longitudinal_step() +
+                             at.sigma_first;
 }
 
 /// Four exits on axes that are symmetric about 0: how far from 0 [stretches], and which of them lie below it.
@@ -113,12 +115,17 @@ MEDULLA_HOT float azimuthal_density(const DenseTables& t, const TableRows& at, c
 MEDULLA_HOT float longitudinal_density(const DenseTables& t, const TableRows& at, const ExitPlaces& places, int i,
                                        float forwardness) noexcept {
     const RowPoint exit = t.theta_r.at_place(std::uint32_t(places.stretch[i]), places.place[i]);
-    const std::size_t step = t.longitudinal_step(), theta_step = step * 2 * t.theta_r.rows,
-                      g_step = theta_step * t.theta_i.rows, side = t.sigma.rows;
+    const std::size_t side = t.longitudinal_side(), step = 2 * side, theta_step = step * 2 * t.theta_r.rows,
+                      g_step = theta_step * t.theta_i.rows;
     const Four w0 = spread<0>(exit.weight), w1 = spread<1>(exit.weight), w2 = spread<2>(exit.weight),
                w3 = spread<3>(exit.weight);
     const float* row =
         t.floats(t.longitudinal) + at.longitudinal + step * (exit.first + (places.below >> i & 1u) * t.theta_r.rows);
+    if (t.one_material) {
+        const Four back = row_density(row, step, w0, w1, w2, w3),
+                   forward = row_density(row + side, step, w0, w1, w2, w3);
+        return sum_of((back + Four(forwardness) * (forward - back)) * aligned_four_at(at.theta_i));
+    }
     Four back, forward;
     std::uint32_t j = 0;
     do {
@@ -167,21 +174,26 @@ struct LongitudeDraw {
 };
 /// @param which, u as above
 MEDULLA_HOT LongitudeDraw begin_longitude(const DenseTables& t, const TableRows& at, float which, float u) noexcept {
-    const std::uint32_t g = at.g_count == 1 ? 0 : at.g_first + draw_row(at.g, which),
-                        theta = at.theta_first + draw_row(at.theta_i, which),
-                        sigma = draw_row(at.sigma, which) + at.sigma_first;
-    const std::uint32_t row = g * t.theta_i.rows + theta, blocks = block_count(t.theta_r), step = t.longitudinal_step();
-    const float* const cumulated = t.floats(t.longitudinal_blocks) + std::size_t(row * step + sigma) * blocks;
+    const std::uint32_t theta = at.theta_first + draw_row(at.theta_i, which);
+    std::uint32_t plane = 0, line = theta;
+    if (!t.one_material) {
+        const std::uint32_t g = at.g_count == 1 ? 0 : at.g_first + draw_row(at.g, which);
+        plane = g * t.theta_i.rows + theta;
+        line = draw_row(at.sigma, which) + at.sigma_first;
+    }
+    const std::uint32_t blocks = block_count(t.theta_r), step = t.longitudinal_step();
+    const float* const cumulated = t.floats(t.longitudinal_blocks) + std::size_t(plane * step + line) * blocks;
     u = below_1(u);
-    return {t.floats(t.longitudinal) + std::size_t(row * 2 * t.theta_r.rows) * step + sigma,
+    return {t.floats(t.longitudinal) + std::size_t(plane * 2 * t.theta_r.rows) * step + line,
             which,
             {draw_block(t.theta_r, cumulated, u),
-             draw_block(t.theta_r, cumulated + std::size_t(t.sigma.rows) * blocks, u)}};
+             draw_block(t.theta_r, cumulated + std::size_t(t.longitudinal_side()) * blocks, u)}};
 }
 /// theta_r, as seen from theta_i >= 0 [radians]. @param forwardness |phi| / pi
 MEDULLA_HOT float finish_longitude(const DenseTables& t, const LongitudeDraw& draw, float forwardness) noexcept {
     const auto forward = std::uint32_t(draw.side < forwardness);
-    return draw_in_block(t.theta_r, draw.row + forward * t.sigma.rows, t.longitudinal_step(), draw.block[forward]);
+    return draw_in_block(t.theta_r, draw.row + forward * t.longitudinal_side(), t.longitudinal_step(),
+                         draw.block[forward]);
 }
 
 /// What -log(survival) is per absorption, at one offset.

@@ -1,0 +1,47 @@
+// What samples add up to, pixel by pixel; kept in a file so that a picture goes on after a kill.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "render/vector.hpp"
+
+namespace medulla::render {
+
+struct Pixel {
+    double sum[3] = {};
+    double squares = 0;  ///< of the luminance
+
+    void add(Rgb c) {
+        sum[0] += double(c.x), sum[1] += double(c.y), sum[2] += double(c.z);
+        const double y = double(luminance(c));
+        squares += y * y;
+    }
+    double luminance_sum() const { return 0.2126 * sum[0] + 0.7152 * sum[1] + 0.0722 * sum[2]; }
+};
+
+struct Film {
+    int width = 0, height = 0;
+    std::uint32_t samples = 0;    ///< per pixel, the same in all of them
+    std::uint64_t nonfinite = 0;  ///< samples that were dropped (and count as black)
+    std::vector<Pixel> pixels;    ///< row by row from the top
+
+    Film(int w, int h) : width(w), height(h), pixels(std::size_t(w) * std::size_t(h)) {}
+    Rgb colour(std::size_t i) const {
+        const double s = 1.0 / double(samples);
+        return {float(pixels[i].sum[0] * s), float(pixels[i].sum[1] * s), float(pixels[i].sum[2] * s)};
+    }
+    /// Standard error of a pixel's luminance, as if samples were independent.
+    double standard_error(std::size_t i) const;
+    /// Root mean square of the pixels' standard errors over the mean luminance; infinite below two samples.
+    double error() const;
+    void mean(double (&rgb)[3]) const;
+};
+
+/// Writes beside `path` and renames: at any moment the file is whole or absent. `key` says of which picture it is.
+void save(const Film& film, const std::string& key, const std::string& path);
+/// False where there is no such file; throws Error where it belongs to another picture or is damaged.
+bool load(Film& film, const std::string& key, const std::string& path);
+
+}  // namespace medulla::render

@@ -1,0 +1,84 @@
+// What rays meet: strands as Embree's round B-spline curves, skins and ground as triangles.
+//
+// No ray is moved off the surface that it leaves. What it starts on is left out by name instead: on a fibre its own
+// strand within four radii of the start (the fibre model has already carried the light through to any side), on a skin
+// its own triangle. Backs are never hit, so that neither the far side of a fibre nor a neighbouring triangle below the
+// start stops a ray.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "render/groom.hpp"
+#include "render/shape.hpp"
+
+namespace medulla::render {
+
+inline constexpr std::uint32_t nothing = 0xffffffffu;
+
+/// What a ray starts on; nothing for the camera's.
+struct Start {
+    std::uint32_t geometry = nothing, part = 0;  ///< part: strand or triangle
+    float along = 0, reach = 0;                  ///< of a strand, both in segments
+};
+
+struct Ray {
+    Vec3 origin, direction;
+    Start start;
+};
+
+struct Hit {
+    float distance = 0;
+    std::uint32_t geometry = nothing, primitive = 0;
+    float u = 0, v = 0;
+    explicit operator bool() const { return geometry != nothing; }
+};
+
+/// A hit on a strand, with the axis of the curve there.
+struct StrandHit {
+    Vec3 axis, tangent;  ///< the point of the axis; from root to tip, unit
+    float radius;
+    float along;  ///< [0, 1] from root to tip
+    std::uint32_t strand;
+    Start start;
+};
+
+struct SkinHit {
+    Vec3 position, normal, facet_normal;
+    Rgb albedo;
+    Start start;
+};
+
+class Geometry {
+  public:
+    explicit Geometry(const Scene& scene);
+    ~Geometry();
+    Geometry(const Geometry&) = delete;
+    Geometry& operator=(const Geometry&) = delete;
+
+    Hit nearest(const Ray& ray) const;
+    bool blocked(const Ray& ray, float distance) const;
+
+    bool is_strand(const Hit& hit) const { return hit.geometry < strands_.size(); }
+    const Strands& strands(const Hit& hit) const { return strands_[hit.geometry]; }
+    StrandHit strand_hit(const Hit& hit) const;
+    SkinHit skin_hit(const Hit& hit) const;
+
+    const std::vector<Strands>& layers() const { return strands_; }
+    std::size_t strand_count() const;
+    std::size_t bytes() const { return std::size_t(bytes_); }  ///< that Embree has allocated
+
+  private:
+    void add(Strands& strands);
+    void add(const Mesh& mesh);
+    std::vector<Strands> strands_;
+    std::vector<Mesh> meshes_;
+    RTCDevice device_ = nullptr;
+    RTCScene scene_ = nullptr;
+    std::int64_t bytes_ = 0;
+};
+
+}  // namespace medulla::render

@@ -1,0 +1,188 @@
+#include "render/groom.hpp"
+
+#include <unordered_map>
+
+namespace medulla::render {
+namespace {
+
+/// Points by the cell of space that they are in; cells as wide as the greatest distance looked for.
+class PointGrid {
+  public:
+    explicit PointGrid(float cell) : scale_(1 / cell) {}
+
+    void add(Vec3 p, std::uint32_t index) { cells_[key(cell(p.x), cell(p.y), cell(p.z))].push_back({p, index}); }
+
+    /// Calls visit(point, index) for every point within a cell's width of p and for some beyond.
+    template <class Visit>
+    void around(Vec3 p, Visit&& visit) const {
+        const std::int64_t x = cell(p.x), y = cell(p.y), z = cell(p.z);
+        for (std::int64_t i = x - 1; i <= x + 1; ++i)
+            for (std::int64_t j = y - 1; j <= y + 1; ++j)
+                for (std::int64_t k = z - 1; k <= z + 1; ++k) {
+                    const auto at = cells_.find(key(i, j, k));
+                    if (at == cells_.end()) continue;
+                    for (const Entry& entry : at->second) visit(entry.point, entry.index);
+                }
+    }
+
+  private:
+    struct Entry {
+        Vec3 point;
+        std::uint32_t index;
+    };
+    std::int64_t cell(float x) const { return std::int64_t(std::floor(double(x) * double(scale_))); }
+    static std::uint64_t key(std::int64_t x, std::int64_t y, std::int64_t z) {
+        constexpr std::uint64_t low = (1 << 21) - 1;
+        return (std::uint64_t(x) & low) << 42 | (std::uint64_t(y) & low) << 21 | (std::uint64_t(z) & low);
+    }
+    float scale_;
+    std::unordered_map<std::uint64_t, std::vector<Entry>> cells_;
+};
+
+/// Smooth noise in [-1, 1]: random values at whole coordinates, interpolated.
+float value_noise(Vec3 p, std::uint32_t seed) {
+    const float fx = std::floor(p.x), fy = std::floor(p.y), fz = std::floor(p.z);
+    const float tx = smoothstep(0, 1, p.x - fx), ty = smoothstep(0, 1, p.y - fy), tz = smoothstep(0, 1, p.z - fz);
+    const auto corner = [&](int i, int j, int k) {
+        const auto at = [](float f, int d) { return std::uint32_t(std::int32_t(f) + d); };
+        return 2 * unit_float(hash(hash(hash(seed, at(fx, i)), at(fy, j)), at(fz, k))) - 1;
+    };
+    const auto row = [&](int j, int k) { return mix(corner(0, j, k), corner(1, j, k), tx); };
+    return mix(mix(row(0, 0), row(1, 0), ty), mix(row(0, 1), row(1, 1), ty), tz);
+}
+
+Vec3 rotate(Vec3 v, Vec3 axis, float angle) {
+    const float c = std::cos(angle), s = std::sin(angle);
+    return c * v + s * cross(axis, v) + (1 - c) * dot(axis, v) * axis;
+}
+
+/// The strand's centre line as the comb wants it, without curl and clumps: segments + 1 points from the skin outwards.
+std::vector<Vec3> combed(const SurfacePoint& root, const Layer& layer, float length, float noise_a, float noise_b) {
+    const Vec3 n = root.normal;
+    const Vec3 comb = render::length(layer.comb) > 0 ? normalise(layer.comb) : Vec3{};
+    Vec3 tangent = comb - dot(comb, n) * n;
+    // Where the comb runs into the skin there is no direction to lean to: hairs stand up there, without a seam.
+    const float sure = std::min(1.0f, 2 * render::length(tangent));
+    tangent = sure > 1e-4f ? normalise(tangent) : basis_about(n).y;
+    if (layer.swirl > 0)
+        tangent =
+            rotate(tangent, n, layer.swirl * value_noise((1 / layer.swirl_size) * root.position, layer.seed ^ 77));
+    const Vec3 side = cross(n, tangent);
+    std::vector<Vec3> points{root.position - 0.03f * length * n};  // roots end inside the skin
+    const float step = 1.03f * length / float(layer.segments);
+    for (int k = 0; k < layer.segments; ++k) {
+        const float s = (float(k) + 0.5f) / float(layer.segments);
+        const float angle = sure * (layer.lean + layer.bend * s * s) + layer.noise * noise_a * (0.4f + s);
+        const Vec3 w =
+            std::cos(angle) * n + std::sin(angle) * tangent + std::tan(layer.noise) * noise_b * (0.4f + s) * side;
+        points.push_back(points.back() + step * normalise(w));
+    }
+    return points;
+}
+
+}  // namespace
+
+std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::size_t count, std::uint32_t seed) {
+    Sequence random(seed);
+    PointGrid grid(distance);
+    std::vector<SurfacePoint> points;
+    for (std::size_t tries = 0; points.size() < count && tries < 30 * count; ++tries) {
+        const SurfacePoint p = sample_surface(shape, random);
+        bool free = true;
+        grid.around(p.position, [&](Vec3 q, std::uint32_t) {
+            const Vec3 d = q - p.position;
+            free = free && dot(d, d) >= distance * distance;
+        });
+        if (!free) continue;
+        grid.add(p.position, std::uint32_t(points.size()));
+        points.push_back(p);
+    }
+    return points;
+}
+
+namespace {
+
+/// Appends a strand through `line`: one more point at either end so that the spline reaches both.
+void append(const std::vector<Vec3>& line, const std::vector<float>& radius, std::vector<CurvePoint>& points) {
+    const auto put = [&](Vec3 p, float r) { points.push_back({p.x, p.y, p.z, r}); };
+    const std::size_t last = line.size() - 1;
+    put(2 * line[0] - line[1], 2 * radius[0] - radius[1]);
+    for (std::size_t k = 0; k <= last; ++k) put(line[k], radius[k]);
+    put(2 * line[last] - line[last - 1], std::max(0.0f, 2 * radius[last] - radius[last - 1]));
+}
+
+}  // namespace
+
+Strands grow(const Shape& shape, const Layer& layer) {
+    const double wanted = double(layer.density) * double(area_of(shape));
+    const std::size_t count = std::max<std::size_t>(1, std::size_t(wanted + 0.5));
+    // Saturated dart throwing reaches density x distance^2 = 0.69; at 0.53 few darts are lost.
+    const float distance = std::sqrt(0.53f / layer.density);
+    const std::vector<SurfacePoint> roots = poisson_disc(shape, distance, count, layer.seed);
+
+    std::vector<std::vector<Vec3>> guides;
+    PointGrid guide_grid(layer.clump_size > 0 ? 2 * layer.clump_size : 1);
+    if (layer.clump_size > 0 && layer.clump_strength > 0) {
+        const std::size_t most = std::size_t(1 + double(area_of(shape)) / double(layer.clump_size * layer.clump_size));
+        for (const SurfacePoint& centre : poisson_disc(shape, layer.clump_size, most, layer.seed ^ 0x5bd1e995u)) {
+            guide_grid.add(centre.position, std::uint32_t(guides.size()));
+            Sequence random(hash(layer.seed ^ 0x7f4a7c15u, std::uint32_t(guides.size())));
+            const float a = random.even(), b = random.even();
+            guides.push_back(combed(centre, layer, layer.length, a, b));
+        }
+    }
+
+    Strands strands;
+    strands.segments = layer.segments, strands.along = layer.along;
+    strands.colour_noise = layer.colour_noise, strands.seed = layer.seed;
+    strands.points.reserve(roots.size() * std::size_t(layer.segments + 3));
+    std::vector<float> radius(std::size_t(layer.segments) + 1);
+    for (std::size_t k = 0; k < radius.size(); ++k) {
+        const float s = float(k) / float(layer.segments);
+        radius[k] = layer.radius * mix(1.0f, layer.tip, s > layer.taper ? (s - layer.taper) / (1 - layer.taper) : 0.0f);
+    }
+    for (std::size_t i = 0; i < roots.size(); ++i) {
+        Sequence random(hash(layer.seed, std::uint32_t(i)));
+        const float length = layer.length * (1 + layer.length_noise * random.even());
+        const float a = random.even(), b = random.even(), phase = 2 * pi_f * random();
+        std::vector<Vec3> line = combed(roots[i], layer, length, a, b);
+        if (!guides.empty()) {
+            std::uint32_t nearest = 0;
+            float least = 1e30f;
+            guide_grid.around(roots[i].position, [&](Vec3 p, std::uint32_t index) {
+                const Vec3 d = p - roots[i].position;
+                if (dot(d, d) < least) least = dot(d, d), nearest = index;
+            });
+            for (std::size_t k = 1; least < 1e30f && k < line.size(); ++k) {
+                const float s = float(k) / float(layer.segments), pull = layer.clump_strength * std::pow(s, 1.5f);
+                // Towards the guide's line at the same place; the strand's own length stays along it.
+                line[k] = mix(line[k], guides[nearest][k], pull);
+            }
+        }
+        if (layer.curl_radius > 0) {
+            std::vector<Vec3> curled = line;
+            for (std::size_t k = 1; k < line.size(); ++k) {
+                const Vec3 along = normalise(line[k] - line[k - 1]);
+                const Basis basis = basis_about(along);
+                const float s = float(k) / float(layer.segments), angle = phase + 2 * pi_f * layer.curl_turns * s;
+                const float r = layer.curl_radius * std::min(1.0f, 3 * s);
+                curled[k] += r * std::cos(angle) * basis.y + r * std::sin(angle) * basis.z;
+            }
+            line = curled;
+        }
+        append(line, radius, strands.points);
+    }
+    return strands;
+}
+
+Strands strand_of(const SingleFibre& fibre) {
+    Strands strands;
+    strands.segments = int(fibre.points.size()) - 1, strands.along = fibre.along;
+    std::vector<float> radius;
+    for (std::size_t k = 0; k < fibre.points.size(); ++k)
+        radius.push_back(fibre.radius * mix(1.0f, fibre.tip, float(k) / float(strands.segments)));
+    append(fibre.points, radius, strands.points);
+    return strands;
+}
+
+}  // namespace medulla::render

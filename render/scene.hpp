@@ -1,0 +1,113 @@
+// A scene as its file says it: docs/render.md. Lengths in world units, angles in radians (degrees in the file).
+// Rests on the runtime's FurParameters.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "medulla/fur_parameters.hpp"
+#include "render/vector.hpp"
+
+namespace medulla::render {
+
+struct Camera {
+    Vec3 from{0, 0, 4}, to{0, 0, 0}, up{0, 1, 0};
+    float fov = 0.6f;       ///< full vertical angle [radians]
+    float lens_radius = 0;  ///< 0: a pinhole
+    float focus = 0;        ///< distance of the plane in focus; 0: that of `to`
+};
+
+struct Picture {
+    int width = 512, height = 512;
+    float exposure = 0;  ///< stops
+    bool filmic = true;  ///< the PNG's tone curve; otherwise plain sRGB
+};
+
+struct Material {
+    std::string name;
+    FurParameters<3> fur;
+};
+
+/// The material at a place along the strand; between two of them every parameter is interpolated.
+struct Stop {
+    float at;  ///< 0 root, 1 tip
+    int material;
+};
+
+struct Layer {
+    std::vector<Stop> along;
+    float colour_noise = 0;  ///< spread of sigma_ca from strand to strand: factors exp(+-colour_noise)
+    float density = 1000;    ///< strands per unit of area
+    float length = 0.2f, length_noise = 0.2f;  ///< noise: share of the length, even in +-
+    float radius = 0.002f;                     ///< at the root
+    float tip = 0.2f;                          ///< radius at the tip over that at the root
+    float taper = 0.5f;                        ///< place along the strand from which on it narrows
+    float lean = 0.5f, bend = 0.5f;            ///< angle from the normal at the root; what is added up to the tip
+    Vec3 comb{0, -1, 0};                       ///< where to, projected onto the skin
+    float noise = 0.1f;                        ///< random angle from strand to strand
+    float swirl = 0, swirl_size = 0.5f;        ///< smooth turning of the comb across the coat, over a length
+    float curl_radius = 0, curl_turns = 2;
+    float clump_size = 0, clump_strength = 0;  ///< distance between clumps; how far tips move to their clump's, [0, 1]
+    int segments = 6;
+    std::uint32_t seed = 1;
+};
+
+enum class Form { patch, sphere, torus };
+
+struct Shape {
+    Form form = Form::sphere;
+    Vec3 centre;
+    float radius = 1, tube = 0.4f;  ///< sphere and torus (about y); the torus' tube
+    float width = 1, depth = 1;     ///< patch, in the plane y = 0, seen from above
+};
+
+struct Object {
+    Shape shape;
+    bool has_skin = true;
+    Rgb skin{0.3f, 0.2f, 0.15f};  ///< diffuse albedo
+    std::vector<Layer> coat;
+};
+
+/// One fibre by the points it passes through.
+struct SingleFibre {
+    std::vector<Stop> along;
+    std::vector<Vec3> points;  ///< at least two
+    float radius = 0.01f, tip = 1;
+};
+
+/// A floor, and a wall behind it, rounded where they meet.
+struct Ground {
+    bool present = false;
+    float height = -1;  ///< y
+    float size = 20;    ///< half its width
+    float wall = 0;     ///< distance behind the origin (-z) at which it turns up; 0: never
+    Rgb colour{0.4f, 0.4f, 0.4f};
+};
+
+enum class LightForm { sky, sun, rectangle };
+
+struct Light {
+    LightForm form = LightForm::sky;
+    Rgb radiance{1, 1, 1};        ///< sun: irradiance across its direction
+    Vec3 direction{0, 1, 0};      ///< sun: towards it
+    float angle = 0.0046f;        ///< sun: half its angular diameter [radians]
+    Vec3 corner, edge_a, edge_b;  ///< rectangle: lit on the side of cross(edge_a, edge_b)
+};
+
+struct Scene {
+    Camera camera;
+    Picture picture;
+    std::vector<Material> materials;
+    std::vector<Object> objects;
+    std::vector<SingleFibre> fibres;
+    Ground ground;
+    std::vector<Light> lights;
+    std::string text;  ///< the file, to tell whether a picture that goes on is of the same scene
+};
+
+/// Throws Error: one line with file, field, expected and found.
+Scene read_scene(const std::string& path);
+Scene parse_scene(const std::string& text, const std::string& where);
+
+}  // namespace medulla::render

@@ -1,0 +1,143 @@
+// All that the renderer takes from medulla: dense tables for each coat, the fibre at a hit, and its field, which the
+// path tracer evaluates towards lights and samples.
+#pragma once
+
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <vector>
+
+#include "medulla/medulla.hpp"
+#include "render/error.hpp"
+#include "render/groom.hpp"
+#include "render/path.hpp"
+#include "render/scene.hpp"
+
+namespace medulla::render {
+
+/// What a ray found. Unit vectors in world space.
+struct FibreHit {
+    std::size_t layer;  ///< whose strand it is
+    Vec3 tangent;       ///< from root to tip
+    Vec3 known;         ///< back along the ray
+    Vec3 point;         ///< from the axis to the hit [fibre radii]
+    float footprint;    ///< diameter of the path's cone [fibre radii]
+    float along;        ///< [0, 1] from root to tip
+    float colour;       ///< factor of sigma_ca
+};
+
+/// A fibre's field with its frame in the world.
+template <class Field>
+struct FieldInWorld {
+    Basis basis;
+    Field field;
+
+    Evaluation<3> evaluate(Vec3 drawn) const { return field.evaluate(local(basis, drawn)); }
+    Sample<3> sample(RandomNumbers u) const { return field.sample(u); }
+    Vec3 world(Vector w) const { return basis.to_world({w.x, w.y, w.z}); }
+    static Vector local(const Basis& basis, Vec3 w) {
+        const Vec3 v = basis.to_local(w);
+        return {v.x, v.y, v.z};
+    }
+};
+
+inline Rgb rgb(const Colour<3>& c) { return {c[0], c[1], c[2]}; }
+
+class Shading {
+  public:
+    Shading(const Scene& scene, const std::vector<Strands>& layers, LobeMask lobes) : lobes_(lobes) {
+        const PackView pack = default_pack();
+        for (const Strands& layer : layers) coats_.push_back(make_coat(scene.materials, layer.along, pack));
+    }
+
+    /// Calls use(field in world) for the fibre at a hit.
+    template <class Use>
+    void at(const FibreHit& hit, FieldChoice choice, Use&& use) const {
+        const Basis basis = basis_about(hit.tangent);
+        const Vector known = FieldInWorld<int>::local(basis, hit.known);
+        const float h = offset_of(known, FieldInWorld<int>::local(basis, hit.point));
+        const Coat& coat = coats_[hit.layer];
+        const Fibre<3> fibre = coat.stops.size() == 1 && hit.colour == 1 ? coat.first : fibre_at(coat, hit);
+        const bool one_offset = choice == FieldChoice::one_offset ||
+                                (choice == FieldChoice::multiscale && hit.footprint < narrow_footprint);
+        if (one_offset) return with_lobes(basis, near_field(fibre, known, h), use);
+        const Offsets offsets = choice == FieldChoice::multiscale ? pixel_coverage(h, hit.footprint, 1, 1) : Offsets{};
+        with_lobes(basis, far_field(fibre, known, offsets), use);
+    }
+
+  private:
+    /// A cone narrower than this share of the radius sees one offset.
+    static constexpr float narrow_footprint = 0.05f;
+
+    struct Free {
+        void operator()(void* memory) const { std::free(memory); }
+    };
+    struct ParametersAt {
+        float at;
+        FurParameters<3> fur;
+    };
+    struct Coat {
+        std::vector<ParametersAt> stops;
+        std::unique_ptr<void, Free> memory;
+        const DenseTables* tables = nullptr;
+        Fibre<3> first;
+    };
+
+    template <class Field, class Use>
+    void with_lobes(const Basis& basis, const Field& field, Use&& use) const {
+        use(FieldInWorld<Field>{basis, lobes_ == all_lobes ? field : field.keep(lobes_)});
+    }
+
+    /// Tables over all that materials between the stops can ask for: the ends of each parameter's range.
+    static Coat make_coat(const std::vector<Material>& materials, const std::vector<Stop>& along,
+                          const PackView& pack) {
+        Coat coat;
+        for (const Stop& stop : along) coat.stops.push_back({stop.at, materials[std::size_t(stop.material)].fur});
+        FurParameters<3> low = coat.stops[0].fur, high = low;
+        for (const ParametersAt& stop : coat.stops) {
+            const FurParameters<3>& p = stop.fur;
+            low.sigma_ms = std::min(low.sigma_ms, p.sigma_ms), high.sigma_ms = std::max(high.sigma_ms, p.sigma_ms);
+            low.kappa = std::min(low.kappa, p.kappa), high.kappa = std::max(high.kappa, p.kappa);
+            low.g = std::min(low.g, p.g), high.g = std::max(high.g, p.g);
+            high.eta = std::min(high.eta, p.eta);
+        }
+        const TableRanges ranges = join(ranges_of(low), ranges_of(high));
+        const std::size_t bytes = (tables_bytes(pack, ranges) + 63) / 64 * 64;
+        coat.memory.reset(std::aligned_alloc(64, std::max<std::size_t>(64, bytes)));
+        const TablesResult made = make_tables(pack, ranges, coat.memory.get(), bytes);
+        if (made.status != TablesStatus::ok)
+            throw Error("material {}: {}", materials[std::size_t(along[0].material)].name, describe(made.status));
+        coat.tables = made.tables;
+        for (const Stop& stop : along) {
+            const Material& material = materials[std::size_t(stop.material)];
+            const Fibre<3> fibre = make_fibre(material.fur, coat.tables);
+            if (fibre.status != FibreStatus::ok) throw Error("material {}: {}", material.name, describe(fibre.status));
+        }
+        coat.first = make_fibre(coat.stops[0].fur, coat.tables);
+        return coat;
+    }
+
+    /// All parameters interpolated between the two stops about the hit.
+    static Fibre<3> fibre_at(const Coat& coat, const FibreHit& hit) {
+        std::size_t next = 0;
+        while (next < coat.stops.size() && coat.stops[next].at <= hit.along) ++next;
+        FurParameters<3> p = coat.stops[next == 0 ? 0 : next - 1].fur;
+        if (next > 0 && next < coat.stops.size()) {
+            const FurParameters<3>& q = coat.stops[next].fur;
+            const float from = coat.stops[next - 1].at, t = (hit.along - from) / (coat.stops[next].at - from);
+            for (float FurParameters<3>::*x :
+                 {&FurParameters<3>::eta, &FurParameters<3>::kappa, &FurParameters<3>::alpha, &FurParameters<3>::beta_m,
+                  &FurParameters<3>::beta_n, &FurParameters<3>::layers, &FurParameters<3>::sigma_ms,
+                  &FurParameters<3>::sigma_ma, &FurParameters<3>::g})
+                p.*x = mix(p.*x, q.*x, t);
+            for (int c = 0; c < 3; ++c) p.sigma_ca[c] = mix(p.sigma_ca[c], q.sigma_ca[c], t);
+        }
+        for (float& sigma : p.sigma_ca) sigma *= hit.colour;
+        return make_fibre(p, coat.tables, OutOfRange::clamp);
+    }
+
+    LobeMask lobes_;
+    std::vector<Coat> coats_;
+};
+
+}  // namespace medulla::render

@@ -499,7 +499,8 @@ class Programs(unittest.TestCase):
             status, out, err = run("furtable", "bcsdf", *args, "--json")
             self.assertEqual((status, err), (0, ""))
             answer = json.loads(out)
-            self.assertEqual(list(answer["lobes"]), ["R", "TT", "TRT", "TTs", "TRTs"])
+            published = ["R", "TT", "TRT", "TTs", "TRTs"]
+            self.assertEqual(list(answer["lobes"]), published if "published" in args else [*published, "residual"])
             return answer
 
         cat = lobes("--preset", "cat", *where, "--h", 0.3)
@@ -524,7 +525,11 @@ class Programs(unittest.TestCase):
         self.assertGreater(colour["sum"][0], colour["sum"][1])
         self.assertNotEqual(colour["lobes"]["TT"]["N"][0], cat["lobes"]["TT"]["N"])
         rows = run("furtable", "bcsdf", "--preset", "cat", *where, "--h", 0.3)[1].splitlines()
-        self.assertEqual([row.split()[0] for row in rows], ["lobe", "R", "TT", "TRT", "TTs", "TRTs", "sum"])
+        self.assertEqual([row.split()[0] for row in rows], ["lobe", "R", "TT", "TRT", "TTs", "TRTs", "residual", "sum"])
+        published = lobes("--preset", "cat", *where, "--h", 0.3, "--form", "published")
+        self.assertEqual(published["lobes"], {name: lobe for name, lobe in cat["lobes"].items() if name != "residual"})
+        self.assertLess(published["sum"], cat["sum"])
+        self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, "--far", "--form", "x", names=["--form", "published"])
 
         self.fails(2, "furtable", "bcsdf", "--preset", "lion", *where, "--far", names=["--preset", "bobcat", "lion"])
         self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, names=["--h"])

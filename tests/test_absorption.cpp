@@ -213,7 +213,10 @@ TEST_CASE("The fibre's scattered energies are those of the table at the absorpti
         if (at.sigma == 0 || at.h == 1) continue;
         p.sigma_ms = float(at.sigma) / p.kappa, p.sigma_ma = float(at.absorption) / p.kappa, p.g = float(at.g);
         const test::FibreOf<3> fibre(p, pack);
-        REQUIRE(fibre.status == FibreStatus::ok);
+        // The optical radius grows by up to eta / sqrt(eta^2 - 1) = 1.31 towards grazing light, beyond the axis of the
+        // pack.
+        REQUIRE(fibre.status ==
+                (at.sigma < table.axis("sigma").values.back() / 1.31 ? FibreStatus::ok : FibreStatus::beyond_tables));
         const NearField<3> hit = near_field(fibre, Angles{0, 0}, float(at.h) * p.kappa * p.eta);
         REQUIRE(hit.known.cosine > 0);
         INFO(table.describe(cell));

@@ -140,7 +140,7 @@ TEST_CASE("tables that are absent or too small are said to be, and the fibre is 
     CHECK(is_light(near_field(dense, known, 0.2f).evaluate(drawn)));
 }
 
-TEST_CASE("offsets a rounding beyond the rim are at the rim; a NaN is black", "[bcsdf]") {
+TEST_CASE("offsets a rounding beyond the rim are at the rim, and a NaN is black", "[bcsdf]") {
     const FibreOf fibre(parameters_of<3>(*find_preset("bobcat")), shipped());
     const Angles known = {0.3f, 0}, drawn = {-0.28f, 3.0f};
     for (float side : {1.0f, -1.0f}) {
@@ -162,7 +162,7 @@ TEST_CASE("offsets a rounding beyond the rim are at the rim; a NaN is black", "[
     CHECK(whole.value[0] == more.value[0]);
 }
 
-TEST_CASE("directions of any length are those of length 1; none, NaN and along the fibre is black", "[bcsdf]") {
+TEST_CASE("directions of any length are those of length 1, and none, NaN and along the fibre is black", "[bcsdf]") {
     const FibreOf fibre(parameters_of<3>(*find_preset("bobcat")), shipped());
     const Vector known = {0.3f, 0.5f, -0.8f}, drawn = {-0.2f, 0.6f, 0.77f};
     const auto scaled = [](Vector w, float s) { return Vector{s * w.x, s * w.y, s * w.z}; };

@@ -1,4 +1,4 @@
-// furtable bcsdf and furtable presets: the fur model by hand, lobe by lobe.
+// furtable bcsdf and furtable presets: evaluates the fur model lobe by lobe.
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -13,25 +13,24 @@
 namespace medulla::tables {
 namespace {
 
-struct BcsdfOptions {
+struct BcsdfArguments {
     std::string preset, material, range, pack = "default", form;
     double theta_i = 0, theta_r = 0, phi = 0, h = 0;
     bool far = false, json = false;
     const CLI::Option* h_given = nullptr;
 };
 
-Offsets offsets_of(const BcsdfOptions& options) {
-    if (options.far) return {-1, 1};
-    if (*options.h_given) {
-        if (!(options.h >= -1 && options.h <= 1))
-            throw UsageError("--h: expected a value in [-1, 1], found {:g}", options.h);
-        return {static_cast<float>(options.h), static_cast<float>(options.h)};
+Offsets offsets_of(const BcsdfArguments& args) {
+    if (args.far) return {-1, 1};
+    if (*args.h_given) {
+        if (!(args.h >= -1 && args.h <= 1)) throw UsageError("--h: expected a value in [-1, 1], found {:g}", args.h);
+        return {static_cast<float>(args.h), static_cast<float>(args.h)};
     }
-    const std::size_t colon = std::min(options.range.find(':'), options.range.size() - 1);
-    const auto low = parse_number<double>(options.range.substr(0, colon)),
-               high = parse_number<double>(options.range.substr(colon + 1));
+    const std::size_t colon = std::min(args.range.find(':'), args.range.size() - 1);
+    const auto low = parse_number<double>(args.range.substr(0, colon)),
+               high = parse_number<double>(args.range.substr(colon + 1));
     if (!low || !high || !(-1 <= *low && *low <= *high && *high <= 1))
-        throw UsageError("--h-range: expected A:B with -1 <= A <= B <= 1, found '{}'", options.range);
+        throw UsageError("--h-range: expected A:B with -1 <= A <= B <= 1, found '{}'", args.range);
     return {static_cast<float>(*low), static_cast<float>(*high)};
 }
 
@@ -41,7 +40,7 @@ nlohmann::ordered_json colour(const double (&value)[3], bool grey) {
     return {value[0], value[1], value[2]};
 }
 
-/// Says where the pack's axes end before what the material evaluates of them: there its end stands in.
+/// Warns if the fibre's parameters are outside the pack's axes, where the runtime clamps them.
 void warn_beyond_axes(const FurParameters<3>& p, double theta_i, double offset, const Source& pack,
                       const std::string& path) {
     const detail::Inclination<double> at = detail::inclination(static_cast<double>(p.eta), std::cos(theta_i));
@@ -49,7 +48,8 @@ void warn_beyond_axes(const FurParameters<3>& p, double theta_i, double offset, 
     const double radius = static_cast<double>(p.kappa) * at.inverse_cos_t;
     evaluated.sigma = radius * static_cast<double>(p.sigma_ms), evaluated.g = static_cast<double>(p.g);
     evaluated.theta_i = std::abs(theta_i);
-    evaluated.h = std::min(offset * at.inverse_index / static_cast<double>(p.kappa), 1.0);  // beyond: past the medulla
+    evaluated.h =
+        std::min(offset * at.inverse_index / static_cast<double>(p.kappa), 1.0);  // beyond, light misses the medulla
     if (pack.absorbs()) evaluated.absorption = radius * static_cast<double>(p.sigma_ma);
     std::string beyond;
     for (const TableKind kind : lobe_kinds) {
@@ -57,7 +57,8 @@ void warn_beyond_axes(const FurParameters<3>& p, double theta_i, double offset, 
         if (beyond.find(one) == std::string::npos) beyond += (beyond.empty() ? "" : "; ") + one;
     }
     if (!beyond.empty())
-        say("furtable", fmt::format("warning: {}: {}: TTs and TRTs are those of the axis's end", path, beyond));
+        say("furtable",
+            fmt::format("warning: {}: {}: TTs and TRTs are evaluated at the end of the axis", path, beyond));
 }
 
 /// Dense tables in memory of their own; empty for a fibre that does not scatter.
@@ -77,48 +78,48 @@ OwnedTables tables_for(const FurParameters<3>& p, const PackView& pack, const st
     return tables;
 }
 
-void run_bcsdf(const BcsdfOptions& options) {
+void run_bcsdf(const BcsdfArguments& args) {
     const auto check = [](const char* name, double degrees, const char* range) {
         if (!(degrees >= -90 && degrees <= 90))
             throw UsageError("{}: expected degrees in {}, found {}", name, range, degrees);
     };
-    check("--theta-i", options.theta_i, "(-90, 90)"), check("--theta-r", options.theta_r, "[-90, 90]");
-    const double phi = std::remainder(options.phi, 360.0);
-    const Offsets range = offsets_of(options);
+    check("--theta-i", args.theta_i, "(-90, 90)"), check("--theta-r", args.theta_r, "[-90, 90]");
+    const double phi = std::remainder(args.phi, 360.0);
+    const Offsets range = offsets_of(args);
     Material material;
-    if (options.material.empty()) {
+    if (args.material.empty()) {
         try {
-            material = preset_material(options.preset, "--preset");
+            material = preset_material(args.preset, "--preset");
         } catch (const Error& error) {
             throw UsageError("{}", error.what());
         }
     } else {
-        material = read_material(options.material);
+        material = read_material(args.material);
     }
-    const std::vector<unsigned char> bytes = read_pack(options.pack);
+    const std::vector<unsigned char> bytes = read_pack(args.pack);
     const PackView pack = open_pack(bytes.data(), bytes.size()).pack;
-    const double radians = pi / 180, theta_i = options.theta_i * radians;
-    const OwnedTables tables = tables_for(material.fur, pack, options.pack);
+    const double radians = pi / 180, theta_i = args.theta_i * radians;
+    const OwnedTables tables = tables_for(material.fur, pack, args.pack);
     const Fibre<3> fibre = make_fibre(material.fur, tables.view);
     const Angles known = {static_cast<float>(theta_i), 0};
-    const float theta_r = static_cast<float>(options.theta_r * radians), azimuth = static_cast<float>(phi * radians);
+    const float theta_r = static_cast<float>(args.theta_r * radians), azimuth = static_cast<float>(phi * radians);
     const bool one_offset = range.low == range.high;
     const NearField<3> at_one = near_field(fibre, known, range.low);
     const FarField<3> mean = far_field(fibre, known, range);
     if (!(at_one.known.cosine > 0))
         throw UsageError(
             "--theta-i: expected degrees within (-90, 90), since light along the fibre meets no section, found {}",
-            options.theta_i);
+            args.theta_i);
     if (tables.view != nullptr)
         warn_beyond_axes(material.fur, theta_i,
                          static_cast<double>(std::max(std::abs(range.low), std::abs(range.high))),
-                         *pack_source(bytes, options.pack), options.pack);
+                         *pack_source(bytes, args.pack), args.pack);
     const LobeValues<3> lobes = one_offset ? at_one.lobes(theta_r, azimuth) : mean.lobes(theta_r, azimuth);
-    const int count = options.form == "published" ? lobe_count : all_lobe_count;
+    const int count = args.form == "published" ? lobe_count : all_lobe_count;
     const double cosine = std::cos(theta_i);
     nlohmann::ordered_json json;
     double sum[3] = {}, density_sum[3] = {};
-    if (!options.json)
+    if (!args.json)
         print("{:<8} {:>12}  {:>12}  {:>12}\n", "lobe", "M [1/rad]", "N [1/rad]", "M N / cos^2 theta_i [1/rad^2]");
     for (int lobe = 0; lobe < count; ++lobe) {
         double N[3], density[3], value[3];
@@ -132,29 +133,29 @@ void run_bcsdf(const BcsdfOptions& options) {
                                            {"N", colour(N, material.grey)},
                                            {"value", colour(value, material.grey)},
                                            {"density", colour(density, material.grey)}};
-        for (int c = 0; c < (material.grey ? 1 : 3) && !options.json; ++c)
+        for (int c = 0; c < (material.grey ? 1 : 3) && !args.json; ++c)
             print("{:<8} {:>12.6g}  {:>12.6g}  {:>12.6g}\n", c == 0 ? lobe_names[lobe] : "",
                   static_cast<double>(lobes.M[lobe]), N[c], value[c]);
     }
     json["sum"] = colour(sum, material.grey);
     json["density"] = colour(density_sum, material.grey);
-    if (options.json)
+    if (args.json)
         print("{}\n", json_line(json));
     else
         print("{}\n", fmt::format("sum      {:.6g}", fmt::join(sum, sum + (material.grey ? 1 : 3), "  ")));
 }
 
-struct PresetOptions {
+struct PresetArguments {
     bool json = false;
 };
 
-/// The number that is printed: 0.88 rather than the float next to it.
+/// The printed decimal number: 0.88, not the nearest float.
 double as_printed(float x) { return std::stod(fmt::format("{}", x)); }
 
-void run_presets(const PresetOptions& options) {
+void run_presets(const PresetArguments& args) {
     nlohmann::ordered_json json = nlohmann::ordered_json::array();
     constexpr const char* line = "{:<10} {:>6} {:>6} {:>6} {:>7} {:>7} {:>8} {:>8} {:>8} {:>5} {:>6}\n";
-    if (!options.json) {
+    if (!args.json) {
         print(line, "name", "kappa", "eta", "alpha", "beta_m", "beta_n", "sigma_ca", "sigma_ms", "sigma_ma", "g",
               "layers");
         // Sigmas are per fibre radius.
@@ -172,52 +173,48 @@ void run_presets(const PresetOptions& options) {
                         {"sigma_ma", as_printed(p.sigma_ma)},
                         {"g", as_printed(p.g)},
                         {"layers", as_printed(p.layers)}});
-        if (!options.json)
+        if (!args.json)
             print(line, p.name, p.kappa, p.eta, p.alpha, p.beta_m, p.beta_n, p.sigma_ca, p.sigma_ms, p.sigma_ma, p.g,
                   p.layers);
     }
-    if (options.json) print("{}\n", nlohmann::ordered_json{{"presets", json}}.dump());
+    if (args.json) print("{}\n", json_line(nlohmann::ordered_json{{"presets", json}}));
 }
 
 }  // namespace
 
 void add_bcsdf(CLI::App& app, Action& action) {
-    add_command<BcsdfOptions>(
+    add_command<BcsdfArguments>(
         app, action, "bcsdf", "the fur model lobe by lobe: M, N, M N / cos^2 theta_i",
-        [](CLI::App& command, BcsdfOptions& options) {
+        [](CLI::App& command, BcsdfArguments& args) {
             auto* which = command.add_option_group("material")->require_option(1);
-            which->add_option("--preset", options.preset, "animal of Table 4 (furtable presets)");
-            which->add_option("--material", options.material, "JSON file of one material");
-            command.add_option("--theta-i", options.theta_i, "inclination of the light, degrees in (-90, 90)")
+            which->add_option("--preset", args.preset, "animal of Table 4 (furtable presets)");
+            which->add_option("--material", args.material, "JSON file of one material");
+            add_number(command, "--theta-i", args.theta_i, "inclination of the light, degrees in (-90, 90)")
                 ->required();
-            command.add_option("--theta-r", options.theta_r, "inclination of exit, degrees in [-90, 90]")->required();
-            command
-                .add_option("--phi", options.phi,
-                            "azimuth of exit less that of the light, degrees; 0 = back, whole turns count for nothing")
+            add_number(command, "--theta-r", args.theta_r, "inclination of exit, degrees in [-90, 90]")->required();
+            add_number(command, "--phi", args.phi,
+                       "azimuth of exit minus that of the light, degrees, modulo 360; 0 = back")
                 ->required();
             auto* where = command.add_option_group("offset")->require_option(1);
-            options.h_given = where->add_option("--h", options.h, "near field: one offset in [-1, 1]");
-            where->add_option("--h-range", options.range, "mean over offsets A:B");
-            where->add_flag("--far", options.far, "far field: mean over -1:1");
+            args.h_given = add_number(*where, "--h", args.h, "near field: one offset in [-1, 1]");
+            where->add_option("--h-range", args.range, "mean over offsets A:B");
+            where->add_flag("--far", args.far, "far field: mean over -1:1");
             command
-                .add_option("--pack", options.pack,
-                            "tables of the scattered lobes; beyond its axes their ends hold, and a warning says so")
+                .add_option("--pack", args.pack,
+                            "tables of the scattered lobes; parameters outside its axes are clamped, with a warning")
                 ->capture_default_str();
-            command
-                .add_option("--form", options.form,
-                            "published: the five lobes of Eq. 12; without it also the residual one, as the runtime's "
-                            "value has it")
+            command.add_option("--form", args.form, "published: the five lobes of Eq. 12, without the residual lobe")
                 ->check(CLI::IsMember({"published"}));
-            command.add_flag("--json", options.json, "print one JSON object");
+            command.add_flag("--json", args.json, "print one JSON object");
         },
         run_bcsdf);
 }
 
 void add_presets(CLI::App& app, Action& action) {
-    add_command<PresetOptions>(
+    add_command<PresetArguments>(
         app, action, "presets", "the animals of Table 4 (angles in degrees, sigma per fibre radius)",
-        [](CLI::App& command, PresetOptions& options) {
-            command.add_flag("--json", options.json, "print one JSON object");
+        [](CLI::App& command, PresetArguments& args) {
+            command.add_flag("--json", args.json, "print one JSON object");
         },
         run_presets);
 }

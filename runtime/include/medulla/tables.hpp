@@ -47,7 +47,7 @@ MEDULLA_FN TableRanges join(const TableRanges& a, const TableRanges& b) noexcept
             a.sigma_low < b.sigma_low ? a.sigma_low : b.sigma_low,
             a.sigma_high > b.sigma_high ? a.sigma_high : b.sigma_high,
             a.absorption,
-            a.eta == b.eta ? a.eta : 0.0f};
+            a.eta < b.eta || a.eta > b.eta ? 0.0f : a.eta};
 }
 
 /// Dense tables as they lie in memory; made by make_tables. Arrays follow the struct.

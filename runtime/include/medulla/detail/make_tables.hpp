@@ -52,7 +52,7 @@ MEDULLA_FN double sigma_at(const TableRanges& r, double theta_i) noexcept {
 }
 /// Whether ranges are those of one material, and no wider.
 MEDULLA_FN bool of_one_material(const TableRanges& r) noexcept {
-    if (!(r.eta > 1 && within(r.eta, 1e9f) && r.g_low == r.g_high)) return false;
+    if (!(r.eta > 1 && within(r.eta, 1e9f)) || r.g_high > r.g_low) return false;
     const double high = double(r.sigma_low) * double(r.eta) / std::sqrt((double(r.eta) - 1) * (double(r.eta) + 1));
     return std::abs(double(r.sigma_high) - high) <= 1e-5 * high;
 }
@@ -122,6 +122,7 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
         !clip_range(plan.azimuthal, plan.side[0], Quantity::sigma, r.sigma_low, r.sigma_high) ||
         !(within(r.absorption, 1e9f) && r.absorption >= 0))
         return fail(TablesStatus::bad_ranges);
+    if (!plan.survival) r.absorption = 0;  // Eq. 20 has all of the absorption then
     // One optical radius is a range of a hundredth about it: rows need a span.
     double low = std::sqrt(double(r.sigma_low)), high = std::sqrt(double(r.sigma_high));
     const double widest = double(axis_of(plan.azimuthal, Quantity::sigma).upper());

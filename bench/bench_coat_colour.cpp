@@ -1,5 +1,5 @@
 // How far sigma_ca_of_fur_colour is off: light from a white sky walks through thick coats of the fibres that it
-// returns, by the runtime's near fields, and what comes back is held against the colour that was wanted. Run:
+// returns, by the runtime's near fields, and what comes back is compared with the colour that was wanted. Run:
 // bench_coat_colour [--error E] [--parallel] [--json]; E: relative standard error of each walk, default 0.004.
 // --parallel adds coats of parallel fibres, flat and at 45 degrees to the skin.
 #include <algorithm>

@@ -37,8 +37,9 @@ Picture read_picture(Fields f) {
     return p;
 }
 
-FurParameters<3> preset(const std::string& name, const std::string& place) {
-    if (const FurPreset* row = find_preset(name.c_str())) return parameters_of<3>(*row);
+FurParameters<3> preset(const std::string& name, bool printed, const std::string& place) {
+    if (const FurPreset* row = find_preset(name.c_str()))
+        return printed ? parameters_of<3>(*row) : coloured_parameters_of(*row);
     std::string names;
     for (const FurPreset& row : fur_presets) names += std::string(names.empty() ? "" : ", ") + row.name;
     throw Error("{}: expected one of {}; found '{}'", place, names, name);
@@ -49,7 +50,10 @@ Material read_material(Fields f) {
     Material m;
     m.name = f.text("name", "");
     if (m.name.empty()) throw Error("{}: expected a name, found none", f.place("name"));
-    if (f.has("preset")) m.fur = preset(f.text("preset", ""), f.place("preset"));
+    if (f.has("preset")) {
+        const bool printed = f.choice("colour", {"coat", "printed"}, 0) == 1;
+        m.fur = preset(f.text("preset", ""), printed, f.place("preset"));
+    }
     FurParameters<3>& p = m.fur;
     p.eta = f.number("eta", p.eta, {1, 10, true}), p.kappa = f.number("kappa", p.kappa, share);
     p.alpha = f.degrees("alpha", p.alpha, -90, 90);

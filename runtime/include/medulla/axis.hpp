@@ -88,8 +88,8 @@ struct Cell {
     T x;
 };
 
-/// The cell of `x` (a spline coordinate), held to the axis's ends. A NaN stays NaN in `x` and takes span 0, so that it
-/// is seen in the result.
+/// The cell of `x` (a spline coordinate), clamped to the axis's ends. A NaN stays NaN in `x` and takes span 0, so that
+/// it shows in the result.
 template <class T>
 MEDULLA_HOT Cell<T> locate(const AxisView<T>& axis, T x) noexcept {
     const T lower = axis.lower(), upper = axis.upper();
@@ -105,39 +105,6 @@ MEDULLA_HOT Cell<T> locate(const AxisView<T>& axis, T x) noexcept {
         span += half & (0u - std::uint32_t(axis.breakpoint(std::int32_t(span + half)) <= x));
         n -= half;
     }
-    return {span, x};
-}
-
-/// Where to start looking on an axis: the span at the lower end of each of 64 even stretches. A material keeps one for
-/// each axis that it asks, so that uneven breakpoints cost no search.
-template <class T>
-struct AxisIndex {
-    T lower, upper, scale;  ///< scale = 64 / (upper - lower)
-    std::uint16_t start[64];
-};
-
-template <class T>
-MEDULLA_FN AxisIndex<T> index_axis(const AxisView<T>& axis) noexcept {
-    AxisIndex<T> index;
-    index.lower = axis.lower(), index.upper = axis.upper(), index.scale = T(64) / (index.upper - index.lower);
-    for (int i = 0; i < 64; ++i)
-        index.start[i] = static_cast<std::uint16_t>(locate(axis, index.lower + T(i) / index.scale).span);
-    return index;
-}
-
-/// As locate(axis, x).
-template <class T>
-MEDULLA_HOT Cell<T> locate(const AxisView<T>& axis, const AxisIndex<T>& index, T x) noexcept {
-    const T lower = index.lower, upper = index.upper;
-    x = x < lower ? lower : (x > upper ? upper : x);
-    const T stretch = (x - lower) * index.scale;
-    const std::int32_t i = stretch > T(0) ? std::int32_t(stretch) : 0;
-    std::uint32_t span = index.start[i < 63 ? i : 63];
-    // One back for the rounding of the stretch, two on without a branch, and any more where breakpoints are dense.
-    span -= std::uint32_t(span > 0) & std::uint32_t(axis.breakpoint(std::int32_t(span)) > x);
-    for (int step = 0; step < 2; ++step)
-        span += std::uint32_t(span + 1 < axis.spans) & std::uint32_t(axis.breakpoint(std::int32_t(span + 1)) <= x);
-    while (span + 1 < axis.spans && axis.breakpoint(std::int32_t(span + 1)) <= x) ++span;
     return {span, x};
 }
 

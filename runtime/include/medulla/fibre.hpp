@@ -19,7 +19,7 @@ inline namespace MEDULLA_TARGET {
 enum class FibreStatus : std::uint32_t {
     ok,
     clamped_parameters,  ///< usable: parameters out of range were brought into it, as asked; out_of_range says which
-    beyond_tables,       ///< usable: g or the optical radius lies beyond the tables, whose ends stand in
+    beyond_tables,       ///< usable: g or the optical radius is outside the tables' ranges and clamped to them
     no_tables,           ///< usable: kappa > 0 and sigma_ms > 0, but there are no tables: scattered lobes are absent
     bad_parameters,      ///< black: out_of_range says which parameters are out of their ranges
 };
@@ -31,7 +31,7 @@ MEDULLA_FN const char* describe(FibreStatus status) noexcept {
         case FibreStatus::clamped_parameters:
             return "parameters were clamped to their ranges";
         case FibreStatus::beyond_tables:
-            return "g or the optical radius is beyond the tables' ranges, whose ends stand in";
+            return "g or the optical radius is outside the tables' ranges, and is clamped to them";
         case FibreStatus::no_tables:
             return "no tables: scattered lobes are absent";
         case FibreStatus::bad_parameters:

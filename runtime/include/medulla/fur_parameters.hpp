@@ -1,5 +1,5 @@
 // What a fur fibre is made of: ten numbers, the animals of Table 4, and what a renderer is told about bad ones.
-// Rests on Yan et al. 2017, DenseTables 1 and 4; lengths are in fibre radii, angles in radians.
+// Rests on Yan et al. 2017, Tables 1 and 4; lengths are in fibre radii, angles in radians.
 #pragma once
 
 #include <cstddef>

@@ -32,7 +32,7 @@ struct LobeQuery {
 /// The parameter axes contracted: what is left is one spline over the exit direction.
 struct Contraction {
     alignas(32) float weight[max_rank];  ///< per component, scale included; [0, rank_stride) is set
-    float inverse_integral;              ///< 1 / integral over the exit direction, of the lobe as it is or held to >= 0
+    float inverse_integral;  ///< 1 / integral over the exit direction, of the lobe as it is or clamped to >= 0
 };
 
 namespace detail {
@@ -58,19 +58,10 @@ struct AxisPoint {
     SplineWeights<float> weights;
 };
 
-/// @param x a value of the axis's quantity; outside the axis it is held to its ends
+/// @param x a value of the axis's quantity; clamped to the ends of the axis
 MEDULLA_HOT AxisPoint axis_point(const TableView& table, std::uint32_t k, float x) noexcept {
     const AxisView<float> axis = table.axis(k);
     const Cell<float> cell = locate(axis, spline_coordinate(static_cast<Quantity>(table.layout.axes[k].quantity), x));
-    return {cell.span, spline_weights(axis, cell)};
-}
-
-/// The same with a starting point for the search.
-MEDULLA_HOT AxisPoint axis_point(const TableView& table, std::uint32_t k, const AxisIndex<float>& index,
-                                 float x) noexcept {
-    const AxisView<float> axis = table.axis(k);
-    const Cell<float> cell =
-        locate(axis, index, spline_coordinate(static_cast<Quantity>(table.layout.axes[k].quantity), x));
     return {cell.span, spline_weights(axis, cell)};
 }
 
@@ -100,21 +91,17 @@ struct ExitPoint {
     float sign;  ///< 1 for y >= 0, -1 below; NaN for a NaN
 };
 
-/// y in [-pi, pi] for an azimuth (any number of turns is taken off), else y itself.
+/// y in [-pi, pi] for an azimuth (less any number of whole turns), else y itself.
 MEDULLA_HOT float wrapped_exit(const TableView& table, float y) noexcept {
     if (table.layout.axes[table.parameter_axes()].quantity != static_cast<std::uint32_t>(Quantity::phi)) return y;
     if (y >= -float(pi) && y <= float(pi)) return y;
     return y - std::floor((y + float(pi)) * float(0.5 / pi)) * float(2 * pi);
 }
 
-/// @param y exit direction [radians]; an inclination outside [-pi/2, pi/2] is held to the end
+/// @param y exit direction [radians]; an inclination is clamped to [-pi/2, pi/2]
 MEDULLA_HOT ExitPoint exit_point(const TableView& table, float y) noexcept {
     const float x = wrapped_exit(table, y);
     return {axis_point(table, table.parameter_axes(), x < 0 ? -x : x), x < 0 ? -1.0f : 1.0f};
-}
-MEDULLA_HOT ExitPoint exit_point(const TableView& table, const AxisIndex<float>& index, float y) noexcept {
-    const float x = wrapped_exit(table, y);
-    return {axis_point(table, table.parameter_axes(), index, x < 0 ? -x : x), x < 0 ? -1.0f : 1.0f};
 }
 
 /// 1 / integral over the exit direction of the contracted lobe. A signed low-rank sum with no positive integral is no
@@ -128,7 +115,7 @@ MEDULLA_FN float inverse_integral(const TableView& table, const float* weight) n
     return total > 1e-30f && total < 1e30f ? 1.0f / total : 0.0f;
 }
 
-/// 1 / (integral over the exit direction of the contracted lobe held to >= 0). Reads the whole exit factor.
+/// 1 / (integral over the exit direction of the contracted lobe clamped to >= 0). Reads the whole exit factor.
 MEDULLA_FN float inverse_clamped_integral(const TableView& table, const float* weight) noexcept {
     const float inverse = inverse_integral(table, weight);
     return inverse / (1 + detail::undershoot(table, weight) * inverse);
@@ -145,9 +132,8 @@ MEDULLA_FN void normalise_clamped(const TableView& table, Contraction& contracti
     contraction.inverse_integral = inverse_clamped_integral(table, contraction.weight);
 }
 
-/// Contracts the parameter axes of `table` at `query`; values outside an axis are held to its ends. signed_lobe()
-/// integrates to 1, lobe() to that and what its undershoot hold: the plain twin of contract(), four to five times as
-/// fast.
+/// Contracts the parameter axes of `table` at `query`; values outside an axis are clamped to its ends. signed_lobe()
+/// integrates to 1, lobe() to 1 plus its negative undershoot. Four to five times as fast as contract().
 MEDULLA_FN Contraction contract_signed(const TableView& table, const LobeQuery& query) noexcept {
     Contraction result;
     start_contraction(table, result.weight);
@@ -166,7 +152,7 @@ MEDULLA_FN Contraction contract(const TableView& table, const LobeQuery& query) 
     return result;
 }
 
-/// Density per radian at an exit direction, before anything is held to >= 0.
+/// Density per radian at an exit direction, before it is clamped to >= 0.
 MEDULLA_HOT float signed_lobe(const TableView& table, const Contraction& contraction, const ExitPoint& to) noexcept {
     return detail::sum_of_blend(table, table.parameter_axes(), to.at.span, to.at.weights, contraction.weight, to.sign) *
            contraction.inverse_integral;
@@ -176,9 +162,9 @@ MEDULLA_FN float signed_lobe(const TableView& table, const Contraction& contract
     return signed_lobe(table, contraction, exit_point(table, y));
 }
 
-/// Density per radian, >= 0, of integral 1 where `contract` made the contraction: a signed low-rank sum undershoot
-/// below 0 where the lobe is nearly 0, and holding it there lowers the error (docs/accuracy.md gives how far it
-/// undershoot).
+/// Density per radian, >= 0, of integral 1 where `contract` made the contraction: a signed low-rank sum has
+/// negative undershoots where the lobe is nearly 0, and clamping them lowers the error (docs/accuracy.md has their
+/// size).
 MEDULLA_FN float lobe(const TableView& table, const Contraction& contraction, float y) noexcept {
     const float value = signed_lobe(table, contraction, y);
     return value < 0 ? 0.0f : value;  // a NaN stays one

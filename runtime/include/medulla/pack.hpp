@@ -22,7 +22,7 @@ inline constexpr std::uint32_t max_spans = 4096;
 /// built in reaches 1540.
 inline constexpr float most_reach = 1e7f;
 /// Neighbouring knots are at least this far apart, and none is further from 0 than most_knot: then every difference of
-/// knots, its reciprocal and 64 over an axis's length (AxisIndex) are normal floats, which compilers and processors
+/// knots, its reciprocal and 64 over an axis's length are normal floats, which compilers and processors
 /// that flush denormals or assume finite numbers treat alike. Square roots of sigma are 2^-75 to 2^64.
 inline constexpr float least_span = 0x1p-100f, most_knot = 0x1p100f;
 inline constexpr std::uint32_t rank_multiple = 8;  ///< rows are padded with zeros to a multiple of this rank
@@ -144,7 +144,7 @@ struct TableView {
     MEDULLA_FN std::uint32_t bits(std::uint32_t first) const noexcept {
         return layout.block_bits[first / rank_multiple];
     }
-    /// One number of a row: the plain twin of lookup.hpp's blocks.
+    /// One number of a row: the reference implementation of lookup.hpp's blocks.
     MEDULLA_FN int number(std::uint32_t k, std::uint32_t row_index, std::uint32_t r) const noexcept {
         const unsigned char* block = row(k, row_index);
         for (std::uint32_t first = 0; first + rank_multiple <= r; first += rank_multiple) block += bits(first);

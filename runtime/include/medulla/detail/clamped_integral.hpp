@@ -1,5 +1,5 @@
-// The integral of what a contracted lobe is below 0: a signed low-rank sum undershoot where the lobe is nearly 0, and
-// holding it there adds what it undershoot. Rests on blocks.hpp.
+// The integral of what a contracted lobe is below 0: a signed low-rank sum has negative undershoots where the
+// lobe is nearly 0, and clamping them adds that much to its integral. Rests on blocks.hpp.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // Elementary functions the lobes spend their time in: the standard library's for any scalar, and for float, alone or
-// four abreast, branch-free polynomials (relative error < 4e-7).
+// four at a time, branch-free polynomials (relative error < 4e-7).
 #pragma once
 
 #include <cmath>
@@ -95,7 +95,7 @@ MEDULLA_FN T exponential(T x) noexcept {
 MEDULLA_FN float exponential(float x) noexcept { return polynomial::exponential(x); }
 MEDULLA_FN Four exponential(Four x) noexcept { return polynomial::exponential(x); }
 
-/// exp(x[i]) in the place of each x[i]; floats four abreast.
+/// exp(x[i]) replaces each x[i]; floats four at a time.
 template <std::size_t n, class T>
 MEDULLA_FN void exponentials(T (&x)[n]) noexcept {
     for (T& value : x) value = exponential(value);
@@ -128,7 +128,7 @@ MEDULLA_FN T angle(T sine, T cosine) noexcept {
 MEDULLA_FN float angle(float sine, float cosine) noexcept { return polynomial::angle(sine, cosine); }
 MEDULLA_FN Four angle(Four sine, Four cosine) noexcept { return polynomial::angle(sine, cosine); }
 
-/// angle(sine[i], cosine[i]); floats abreast.
+/// angle(sine[i], cosine[i]); floats side by side.
 template <class T>
 MEDULLA_FN void angles(const T (&sine)[2], const T (&cosine)[2], T (&result)[2]) noexcept {
     for (int i = 0; i < 2; ++i) result[i] = angle(sine[i], cosine[i]);

@@ -46,7 +46,7 @@ struct SplineBlock {
 inline constexpr std::uint32_t block_spans = 4;
 
 /// Even stretches say which span a coordinate lies in. Where a breakpoint is not the end of a stretch, the nearest end
-/// stands in for it; there the cubics of two neighbours differ by the cube of the distance, at most a 32nd of a span.
+/// is used instead; there the cubics of two neighbours differ by the cube of the distance, at most a 32nd of a span.
 struct SplineAxis {
     float lower, scale, end;      ///< coordinate of the lower end; stretches per unit; number of stretches
     float inverse_scale;          ///< 1 / scale
@@ -71,7 +71,7 @@ struct SplineAxis {
         const SplineSpan& s = span(i);
         return {i, s.weights.at(Four(place - s.middle))};
     }
-    /// Rows and weights at a spline coordinate; beyond the axis its end stands in. A NaN gives the lower end's rows and
+    /// Rows and weights at a spline coordinate; clamped to the ends of the axis. A NaN gives the lower end's rows and
     /// NaN weights.
     MEDULLA_HOT RowPoint at(float coordinate) const noexcept {
         const float u = (coordinate - lower) * scale, v = u < 0 ? 0.0f : (u > end ? end : u);

@@ -19,13 +19,9 @@
 using namespace medulla;
 using test::FibreOf;
 using test::OwnedTables;
+using test::shipped;
 
 namespace {
-
-const PackView& shipped() {
-    static const PackView view = default_pack();
-    return view;
-}
 
 /// Relative L2 over the sphere of M^s C^N, tables against factors, at one fibre, inclination and offset.
 double scattered_error(const Fibre<3>& fibre, double theta_i, double h_medulla) {

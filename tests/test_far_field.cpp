@@ -12,15 +12,10 @@
 #include "tests/support/fur_reference.hpp"
 
 using namespace medulla;
-using analytic::AnalyticPack;
+using analytic::pack;
 using test::FibreOf;
 
 namespace {
-
-const AnalyticPack& pack() {
-    static const AnalyticPack p;
-    return p;
-}
 
 /// The mean of the double-precision near field over [h1, h2]: midpoints in asin h, which takes out the fibre rim's
 /// square root, in pieces that end at the medulla's rim and at h = 0, where a low-rank lobe is not quite its own mirror

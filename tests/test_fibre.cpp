@@ -13,15 +13,11 @@
 
 using namespace medulla;
 using test::FibreOf;
+using test::shipped;
 
 namespace {
 
 const float no_number = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
-
-const PackView& shipped() {
-    static const PackView view = default_pack();
-    return view;
-}
 
 /// The number of a parameter; of sigma_ca the second channel's.
 float& number_of(FurParameters<3>& p, Parameter which) {

@@ -13,17 +13,9 @@
 
 using namespace medulla;
 using test::FibreOf;
+using test::shipped;
 
 namespace {
-
-const PackView& shipped() {
-    static const PackView view = default_pack();
-    return view;
-}
-const PackView& analytic_view() {
-    static const analytic::AnalyticPack p;
-    return p.view;
-}
 
 FurParameters<1> random_white_fur(std::mt19937& random, int i) {
     std::uniform_real_distribution<float> u(0, 1);
@@ -106,7 +98,7 @@ TEST_CASE("white furnace: near and far return what comes in", "[bcsdf]") {
     double least[2] = {2, 2}, most[2] = {}, albedo_error = 0;
     for (int i = 0; i < cases; ++i) {
         const FurParameters<1> p = random_white_fur(random, i);
-        const PackView& view = i / 2 % 2 ? shipped() : analytic_view();
+        const PackView& view = i / 2 % 2 ? shipped() : analytic::pack().view;
         TableRanges ranges = ranges_of(p);
         if (i % 4 > 1) ranges.g_low -= 0.1f, ranges.g_high += 0.1f, ranges.sigma_high *= 1.2f;
         const FibreOf<1> fibre(p, view, ranges);

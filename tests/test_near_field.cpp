@@ -9,17 +9,12 @@
 #include "tests/support/fur_reference.hpp"
 
 using namespace medulla;
-using analytic::AnalyticPack;
+using analytic::pack;
 using test::FibreOf;
 
 namespace {
 
-const AnalyticPack& pack() {
-    static const AnalyticPack p;
-    return p;
-}
-
-/// DenseTables that cover every fibre of these tests.
+/// Tables that cover every fibre of these tests.
 const test::OwnedTables& wide_tables() {
     static const test::OwnedTables tables(pack().view, {0, 0.79f, 0, 16, 0});
     return tables;

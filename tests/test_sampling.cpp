@@ -13,19 +13,11 @@
 #include "tests/support/statistics.hpp"
 
 using namespace medulla;
-using analytic::AnalyticPack;
+using analytic::pack;
 using test::FibreOf;
+using test::shipped;
 
 namespace {
-
-const AnalyticPack& pack() {
-    static const AnalyticPack p;
-    return p;
-}
-const PackView& shipped() {
-    static const PackView view = default_pack();
-    return view;
-}
 
 struct Random {
     std::mt19937_64 engine;

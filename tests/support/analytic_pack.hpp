@@ -255,4 +255,9 @@ struct AnalyticPack {
     AnalyticPack& operator=(const AnalyticPack&) = delete;
 };
 
+inline const AnalyticPack& pack() {
+    static const AnalyticPack p;
+    return p;
+}
+
 }  // namespace analytic

@@ -9,6 +9,11 @@
 
 namespace medulla::test {
 
+inline const PackView& shipped() {
+    static const PackView view = default_pack();
+    return view;
+}
+
 /// Dense tables over some ranges. Where make_tables refuses, `get` is null and `status` says why.
 class OwnedTables {
   public:

@@ -2,11 +2,11 @@
 // B-spline weights there. Every stage interpolates with these, offline in double and in a renderer in float.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 
 #include "medulla/config.hpp"
+#include "medulla/detail/math.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {
@@ -29,11 +29,11 @@ inline constexpr std::uint32_t quantity_count = 7;
 /// - inclinations, the same of u = theta_i / (pi/2), since near grazing lobes change as (1 - u) log(1 - u).
 template <class T>
 MEDULLA_FN T spline_coordinate(Quantity quantity, T x) noexcept {
-    if (quantity == Quantity::sigma || quantity == Quantity::absorption) return std::sqrt(x);
+    if (quantity == Quantity::sigma || quantity == Quantity::absorption) return detail::math::sqrt(x);
     if (quantity != Quantity::h && quantity != Quantity::theta_i) return x;
     const T u = quantity == Quantity::h ? x : x * T(2 / pi);
     const T below = T(1) - u;  // below 0 by the rounding of pi/2, or outside the axis, whose end holds there
-    return u / (T(1) + std::sqrt((below < T(0) ? T(0) : below) * (T(1) + u)));
+    return u / (T(1) + detail::math::sqrt((below < T(0) ? T(0) : below) * (T(1) + u)));
 }
 
 /// Inverse of spline_coordinate.

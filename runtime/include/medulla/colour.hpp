@@ -3,10 +3,9 @@
 // docs/bcsdf.md, 'Colour', derives the albedo of a coat, and bench_coat_colour measures how far it is off.
 #pragma once
 
-#include <cmath>
-
 #include "medulla/config.hpp"
 #include "medulla/detail/cross_section.hpp"
+#include "medulla/detail/math.hpp"
 #include "medulla/fur_parameters.hpp"
 
 namespace medulla {
@@ -65,7 +64,7 @@ namespace detail {
 /// s = 0, and 2/3 (1 - log 2) of the albedo at s = 1. His own (0.139, 1.17) are 3 % too low there.
 MEDULLA_FN float half_space_albedo(float albedo, float mean_cosine) noexcept {
     const float lost = albedo < 1 ? 1 - albedo : 0.0f;
-    const float s = std::sqrt(lost / (1 - albedo * mean_cosine));
+    const float s = detail::math::sqrt(lost / (1 - albedo * mean_cosine));
     return (1 - s) * (1 - 0.0935f * s) / (1 + 1.2159f * s);
 }
 
@@ -121,35 +120,36 @@ class FibreAlbedo {
     template <int Channels>
     MEDULLA_FN static void set(const FurParameters<Channels>& p, int i, int k, Node& node) noexcept {
         const float angle = float(pi) * float(i + 1) / float(2 * inclinations + 1);
-        const float sin_i = std::cos(angle), cos_i = std::sin(angle);
+        const float sin_i = detail::math::cos(angle), cos_i = detail::math::sin(angle);
         const float step = float(pi / 2) / float(offsets), gamma = step * (float(k) + 0.5f);
         node.weight = float(4 / (2 * inclinations + 1.0)) * cos_i * cos_i *
-                      (std::sin(step * float(k + 1)) - std::sin(step * float(k)));
+                      (detail::math::sin(step * float(k + 1)) - detail::math::sin(step * float(k)));
         const detail::Inclination<float> at = detail::inclination(p.eta, cos_i, p.fresnel);
-        const detail::Path<float> path = detail::trace(at, p.kappa, p.layers, std::sin(gamma), std::cos(gamma));
+        const detail::Path<float> path =
+            detail::trace(at, p.kappa, p.layers, detail::math::sin(gamma), detail::math::cos(gamma));
         const float depth = 2 * path.s_m * p.sigma_ms * at.inverse_cos_t;
         node.F = path.cuticle.F;
-        node.through = std::exp(-2 * path.s_m * (p.sigma_ms + p.sigma_ma) * at.inverse_cos_t);
+        node.through = detail::math::exp(-2 * path.s_m * (p.sigma_ms + p.sigma_ma) * at.inverse_cos_t);
         node.through_length = 2 * path.s_c * at.inverse_cos_t;
-        node.scattered = -std::expm1(-depth) * std::exp(-p.kappa * p.sigma_ma * at.inverse_cos_t);
+        node.scattered = -detail::math::expm1(-depth) * detail::math::exp(-p.kappa * p.sigma_ma * at.inverse_cos_t);
         node.scattered_length = (path.s_c + 1 - p.kappa) * at.inverse_cos_t;
         const float shift[3] = {1, -0.5f, -1.5f}, rough[3] = {1, 0.5f, 1.5f};
         for (int lobe = 0; lobe < 3; ++lobe) {
             const float m = rough[lobe] * p.beta_m;
-            const float along = std::cos(shift[lobe] * p.alpha) * std::exp(-0.5f * m * m);
-            const float across = std::exp(-0.5f * float(lobe + 1) * p.beta_n * p.beta_n) *
-                                 std::cos(detail::unscattered_centre(lobe, path.gamma_i, path.gamma_t));
+            const float along = detail::math::cos(shift[lobe] * p.alpha) * detail::math::exp(-0.5f * m * m);
+            const float across = detail::math::exp(-0.5f * float(lobe + 1) * p.beta_n * p.beta_n) *
+                                 detail::math::cos(detail::unscattered_centre(lobe, path.gamma_i, path.gamma_t));
             node.cosine[lobe] = along * (sin_i * sin_i - cos_i * cos_i * across);
         }
         const float m = 2.5f * p.beta_m;
-        node.residual_cosine = std::cos(2.5f * p.alpha) * std::exp(-0.5f * m * m) * sin_i * sin_i;
+        node.residual_cosine = detail::math::cos(2.5f * p.alpha) * detail::math::exp(-0.5f * m * m) * sin_i * sin_i;
     }
 
     MEDULLA_FN Light at(float sigma_ca) const noexcept {
         Light sum = {0, 0};
         for (const Node& n : nodes_) {
-            const float T = 1 - n.F, through = n.through * std::exp(-n.through_length * sigma_ca);
-            const float scattered = n.scattered * std::exp(-n.scattered_length * sigma_ca);
+            const float T = 1 - n.F, through = n.through * detail::math::exp(-n.through_length * sigma_ca);
+            const float scattered = n.scattered * detail::math::exp(-n.scattered_length * sigma_ca);
             const float TT = T * T * through, TRT = TT * n.F * through;
             const float TTs = T * scattered, TRTs = TTs * n.F * through;
             // Energies of detail/cross_section.hpp, whose exponents in sigma_ca are kept apart here.

@@ -4,11 +4,11 @@
 // derivation and the errors. Value and measure are those of near_field.hpp.
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/gauss_legendre.hpp"
+#include "medulla/detail/math.hpp"
 #include "medulla/near_field.hpp"
 
 namespace medulla {
@@ -146,7 +146,7 @@ struct Exit {
 };
 MEDULLA_FN Exit exit_of(int p, float inverse_index, float index_excess, float gamma) noexcept {
     const auto sc = sine_cosine(gamma);
-    const float x = std::sqrt(index_excess + sc.cosine * sc.cosine);
+    const float x = detail::math::sqrt(index_excess + sc.cosine * sc.cosine);
     const float gamma_t = p == 0 ? 0.0f : angle(sc.sine * inverse_index, x * inverse_index);
     return {unscattered_centre(p, gamma, gamma_t), 2 * float(p) * sc.cosine / x - 2};
 }
@@ -159,7 +159,8 @@ MEDULLA_FN float invert_exit(int p, float inverse_index, float index_excess, flo
     if (p == 1) {  // d = gamma_i - gamma_t: sin(gamma_t + d) = eta' sin gamma_t
         const float d = 0.5f * (float(pi) - phi);
         const auto sc = full_sine_cosine(d);  // |d| < pi
-        const float c = 1 - sc.cosine * inverse_index, r = sc.sine * inverse_index, unit = 1 / std::sqrt(c * c + r * r);
+        const float c = 1 - sc.cosine * inverse_index, r = sc.sine * inverse_index,
+                    unit = 1 / detail::math::sqrt(c * c + r * r);
         return d + full_angle(c * unit, r * unit);
     }
     // Newton kept in its bracket by bisection; a slope of 0 at a caustic is one end of it.
@@ -169,7 +170,7 @@ MEDULLA_FN float invert_exit(int p, float inverse_index, float index_excess, flo
         if (!(x > low && x < high)) x = 0.5f * (low + high);
         const Exit at = exit_of(p, inverse_index, index_excess, x);
         const float error = at.phi - phi;
-        if (std::abs(error) < tolerance) break;
+        if (detail::math::abs(error) < tolerance) break;
         ((error > 0) == rising ? high : low) = x;
         x = at.slope < 0 || at.slope > 0 ? x - error / at.slope : 0.5f * (low + high);
     }
@@ -181,7 +182,7 @@ template <int Channels>
 MEDULLA_FN float medulla_angle(const FarField<Channels>& field, float gamma) noexcept {
     if (!(field.rim < 1)) return gamma;
     const float s = sine_cosine(gamma).sine / field.rim, t = s > 1 ? 1.0f : (s < -1 ? -1.0f : s);
-    return angle(t, std::sqrt((1 - t) * (1 + t)));
+    return angle(t, detail::math::sqrt((1 - t) * (1 + t)));
 }
 
 /// Gauss rule for `deviations` of a Gaussian under one piece of `length` [radians]: errors of 1e-5 and less
@@ -198,8 +199,8 @@ template <int Channels, class Visit>
 MEDULLA_FN void integrate_piece(const FarField<Channels>& field, int p, float a, float b, float density,
                                 Visit&& visit) noexcept {
     // Through the medulla (R sees none of it) and not so short that the ends' rounding in psi would show.
-    const bool inside =
-        p > 0 && std::abs(a + b) < 2 * field.gamma_rim && field.rim < 1 && field.gamma_high - field.gamma_low > 0.01f;
+    const bool inside = p > 0 && detail::math::abs(a + b) < 2 * field.gamma_rim && field.rim < 1 &&
+                        field.gamma_high - field.gamma_low > 0.01f;
     if (inside) {
         a = medulla_angle(field, a), b = medulla_angle(field, b);
         // Nodes are even in psi, so deviations count there: d gamma_i / d psi is greatest next to psi = 0.
@@ -232,11 +233,12 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float 
         const float b = cuts.gamma[i];
         const Exit at_b = {cuts.phi[i], cuts.slope[i]};
         const bool falling = at_b.phi < at_a.phi;
-        float slope = greater(std::abs(at_a.slope), std::abs(at_b.slope));
-        if (a < 0 && b > 0) slope = greater(slope, std::abs(exit_of(p, at.inverse_index, at.index_excess, 0.0f).slope));
+        float slope = greater(detail::math::abs(at_a.slope), detail::math::abs(at_b.slope));
+        if (a < 0 && b > 0)
+            slope = greater(slope, detail::math::abs(exit_of(p, at.inverse_index, at.index_excess, 0.0f).slope));
         // Every whole turn by which phi - wide .. phi + wide can meet the exits between the cuts.
-        const float low = std::fmin(at_a.phi, at_b.phi), high = greater(at_a.phi, at_b.phi);
-        float y = whole ? phi : phi + float(2 * pi) * std::ceil((low - wide - phi) * float(1 / (2 * pi)));
+        const float low = lesser(at_a.phi, at_b.phi), high = greater(at_a.phi, at_b.phi);
+        float y = whole ? phi : phi + float(2 * pi) * detail::math::ceil((low - wide - phi) * float(1 / (2 * pi)));
         const float last = whole ? phi : high + wide;
         for (; y <= last; y += float(2 * pi)) {
             float ga = a, gb = b, steepest = slope;
@@ -251,7 +253,7 @@ MEDULLA_FN void visit_unscattered(const FarField<Channels>& field, int p, float 
                 if (!(gb > ga)) continue;
                 const float sa = !(ga > a) ? at_a.slope : exit_of(p, at.inverse_index, at.index_excess, ga).slope;
                 const float sb = !(gb < b) ? at_b.slope : exit_of(p, at.inverse_index, at.index_excess, gb).slope;
-                if (!(ga < 0 && gb > 0 && p == 2)) steepest = greater(std::abs(sa), std::abs(sb));
+                if (!(ga < 0 && gb > 0 && p == 2)) steepest = greater(detail::math::abs(sa), detail::math::abs(sb));
             }
             // The image that is y alone: the others' tails are not within this reach of theirs.
             integrate_piece(field, p, ga, gb, steepest / s, [&](const Path<Four>& path, Four weight) {
@@ -287,11 +289,11 @@ MEDULLA_FN void place_cuts(FarField<Channels>& field) noexcept {
         cuts.insert(gamma, low, high);
         cuts.insert(-gamma, low, high);
     };
-    const auto both_at = [&](float c) { both(angle(std::sqrt((1 - c) * (1 + c)), c)); };
+    const auto both_at = [&](float c) { both(angle(detail::math::sqrt((1 - c) * (1 + c)), c)); };
     // The cuticle's F changes over cos gamma_i ~ sqrt(eta'^2 - 1) as eta' -> 1, and ~ 1 / eta' as eta' -> infinity, and
     // with few layers later.
     const float few = lesser(1.0f, greater(2 * field.layers, 0.0625f));
-    const float scale = lesser(std::sqrt(at.index_excess), at.inverse_index) * few;
+    const float scale = lesser(detail::math::sqrt(at.index_excess), at.inverse_index) * few;
     for (float c = 2 * scale; c < 0.8f; c *= 4) both_at(c);
     cuts.insert(low, low - 1, high);
     cuts.insert(high, low, high + 1);
@@ -305,7 +307,7 @@ MEDULLA_FN void place_cuts(FarField<Channels>& field) noexcept {
     }
     keep(1);
     // TRT is stationary where cos^2 gamma_i = (eta'^2 - 1) / 3.
-    if (at.index_excess < 3) both_at(std::sqrt(at.index_excess / 3));
+    if (at.index_excess < 3) both_at(detail::math::sqrt(at.index_excess / 3));
     keep(2);
 }
 
@@ -361,14 +363,14 @@ template <int Channels, class Visit>
 MEDULLA_FN void visit_scattered(const FarField<Channels>& field, Visit&& visit) noexcept {
     const float a = medulla_angle(field, field.gamma_low), b = medulla_angle(field, field.gamma_high);
     if (!(b > a)) return;
-    const float width = 1 - std::abs(field.g);  // of planar HG's peak [radians]
+    const float width = 1 - detail::math::abs(field.g);  // of planar HG's peak [radians]
     const float per_panel = width > 0.2f ? 1.6f : (width > 0.1f ? 0.8f : 0.54f);
     const int index = (width > 0.1f ? 0 : 1) + field.quality;
     const GaussRule rule = gauss_rule(index < 0 ? 0 : index), edge = gauss_rule(0);
     const float tau = field.absorption.medulla_extinction * field.kappa;
     // Where the medulla reaches the fibre's rim, F rises to 1 within the cos gamma_i that place_cuts grades by.
     const Inclination<float>& at = field.inclination;
-    const float steep = lesser(std::sqrt(at.index_excess), at.inverse_index) * lesser(1.0f, 2 * field.layers);
+    const float steep = lesser(detail::math::sqrt(at.index_excess), at.inverse_index) * lesser(1.0f, 2 * field.layers);
     const float rise = field.rim < 1 ? 4.0f : greater(2 * steep, 0.01f), dense = tau > 4 ? 4 / tau : 4.0f;
     const float edge_width = lesser(rise, dense);
     float low = a, high = b;
@@ -424,7 +426,7 @@ MEDULLA_FN FarField<Channels> make_far(const Fibre<Channels>& fibre, const Polar
     field.absorbed = p.sigma_ma * p.kappa * field.inclination.inverse_cos_t;
     field.kappa = p.kappa, field.layers = p.layers, field.g = p.g;
     field.quality = static_cast<int>(quality);
-    const auto angle_of = [](float h) { return angle(h, std::sqrt((1 - h) * (1 + h))); };
+    const auto angle_of = [](float h) { return angle(h, detail::math::sqrt((1 - h) * (1 + h))); };
     field.gamma_low = angle_of(from), field.gamma_high = angle_of(to);
     // One offset is a range of 2e-6 about it: a lobe's exit moves by 8e-6 there, 0.08 of the narrowest deviation.
     if (!(field.gamma_high - field.gamma_low > 2e-6f)) {
@@ -571,7 +573,7 @@ MEDULLA_FN Sample<Channels> FarField<Channels>::draw(RandomNumbers u) const noex
     if (!(this->known.cosine > 0)) return s;
     // Even in h between the ends that the quadrature has: their sines.
     const float h = clamp_offset(sine_cosine(gamma_low).sine + u.offset / inverse_width);
-    const Path<Four> four = trace(inclination, kappa, layers, Four(h), Four(std::sqrt((1 - h) * (1 + h))));
+    const Path<Four> four = trace(inclination, kappa, layers, Four(h), Four(detail::math::sqrt((1 - h) * (1 + h))));
     Four all[all_lobe_count];
     shares_of(energies_at(*this, four), mask, all);
     float share[all_lobe_count];

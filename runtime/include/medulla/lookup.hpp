@@ -3,11 +3,11 @@
 // 0 and theta_i = 0 are their own mirror images: components are even or odd in y, and only y >= 0 is stored.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
 #include "medulla/detail/blocks.hpp"
 #include "medulla/detail/clamped_integral.hpp"
+#include "medulla/detail/math.hpp"
 #include "medulla/pack.hpp"
 
 namespace medulla {
@@ -95,7 +95,7 @@ struct ExitPoint {
 MEDULLA_HOT float wrapped_exit(const TableView& table, float y) noexcept {
     if (table.layout.axes[table.parameter_axes()].quantity != static_cast<std::uint32_t>(Quantity::phi)) return y;
     if (y >= -float(pi) && y <= float(pi)) return y;
-    return y - std::floor((y + float(pi)) * float(0.5 / pi)) * float(2 * pi);
+    return y - detail::math::floor((y + float(pi)) * float(0.5 / pi)) * float(2 * pi);
 }
 
 /// @param y exit direction [radians]; an inclination is clamped to [-pi/2, pi/2]
@@ -180,7 +180,7 @@ MEDULLA_FN float scalar(const TableView& table, const Contraction& contraction) 
 /// E = 1 - exp(-2 sigma sqrt(1 - h^2)): energy that the disc scatters of a ray at offset h (physics.md, section 2).
 template <class T>
 MEDULLA_FN T azimuthal_energy(T sigma, T h) noexcept {
-    return -std::expm1(T(-2) * sigma * std::sqrt((T(1) - h) * (T(1) + h)));
+    return -detail::math::expm1(T(-2) * sigma * detail::math::sqrt((T(1) - h) * (T(1) + h)));
 }
 
 /// 1 - exp(-2 sigma / cos theta_i): energy that the slab scatters, both sides together (physics.md, section 3).
@@ -189,7 +189,7 @@ MEDULLA_FN T longitudinal_energy(T sigma, T theta_i) noexcept {
     // The number next to pi/2 stands for 90 degrees, where any scatterer is met; its own cosine is 6e-17, or below 0.
     const T inclined = theta_i < T(0) ? -theta_i : theta_i;
     if (inclined >= T(pi / 2)) return sigma > T(0) ? T(1) : sigma;  // a NaN goes on
-    return -std::expm1(T(-2) * sigma / std::cos(inclined));
+    return -detail::math::expm1(T(-2) * sigma / detail::math::cos(inclined));
 }
 
 /// Whether a pack knows what absorption leaves: its azimuthal table has that axis, and the lengths stand beside it.
@@ -200,7 +200,7 @@ MEDULLA_FN bool absorbs(const PackView& pack) noexcept {
 /// exp(-absorption length), in [0, 1]. A low-rank length below 0 would be light out of nowhere: it is 0.
 template <class T>
 MEDULLA_FN T survival_of(T absorption, T length) noexcept {
-    return std::exp(-absorption * (length < T(0) ? T(0) : length));
+    return detail::math::exp(-absorption * (length < T(0) ? T(0) : length));
 }
 
 /// Share of the disc's scattered light that absorption leaves; h in [-1, 1]. 1 at absorption 0; NaN above it where the

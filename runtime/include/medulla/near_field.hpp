@@ -7,13 +7,13 @@
 // most 1.
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/cross_section.hpp"
 #include "medulla/detail/gaussian.hpp"
+#include "medulla/detail/math.hpp"
 #include "medulla/detail/table_lookup.hpp"
 #include "medulla/fibre.hpp"
 #include "medulla/vector.hpp"
@@ -356,7 +356,7 @@ MEDULLA_HOT NearField<Channels> make_near(const Fibre<Channels>& fibre, const Po
     hit.known = known;
     const Inclination<float> at = inclination(p.eta, known.cosine, p.fresnel);
     // As trace() has it, with theta_i's angle beside the two of the cross-section.
-    const float cos_h = std::sqrt((1 - h) * (1 + h)), x = std::sqrt(at.index_excess + cos_h * cos_h);
+    const float cos_h = detail::math::sqrt((1 - h) * (1 + h)), x = detail::math::sqrt(at.index_excess + cos_h * cos_h);
     const float sin_t = h * at.inverse_index;
     const Four angles = angle(Four(h, sin_t, known.sine, 0), Four(cos_h, x * at.inverse_index, known.cosine, 1));
     const Path<float> path = path_at(at, p.kappa, p.layers, cos_h, sin_t, x, lane(angles, 0), lane(angles, 1));

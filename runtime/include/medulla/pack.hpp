@@ -8,6 +8,7 @@
 
 #include "medulla/axis.hpp"
 #include "medulla/config.hpp"
+#include "medulla/detail/math.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {
@@ -285,7 +286,7 @@ MEDULLA_FN PackStatus check_knots(const AxisView<float>& axis) noexcept {
     const auto last = std::int32_t(axis.spans + ghost_knots);
     for (std::int32_t i = -std::int32_t(ghost_knots); i <= last; ++i) {
         const Knot<float> k = axis.knot(i);
-        if (!(std::abs(k.t) <= most_knot)) return PackStatus::bad_knots;
+        if (!(detail::math::abs(k.t) <= most_knot)) return PackStatus::bad_knots;
         if (i < last && !(axis.knot(i + 1).t - k.t >= least_span)) return PackStatus::bad_knots;
         // The reciprocals are stored, so they are checked: 1e-4 covers the rounding of differences of close knots.
         const float inverse[3] = {k.inverse1, k.inverse2, k.inverse3};
@@ -301,7 +302,7 @@ MEDULLA_FN PackStatus check_knots(const AxisView<float>& axis) noexcept {
 MEDULLA_FN bool half_circle(const AxisView<float>& axis, Quantity quantity) noexcept {
     if (quantity != Quantity::phi && quantity != Quantity::theta_r) return true;
     const float end = quantity == Quantity::phi ? float(pi) : float(pi / 2);
-    return !(axis.lower() < 0 || axis.lower() > 0) && std::abs(axis.upper() - end) < 1e-6f * end;
+    return !(axis.lower() < 0 || axis.lower() > 0) && detail::math::abs(axis.upper() - end) < 1e-6f * end;
 }
 
 MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) noexcept {
@@ -342,14 +343,15 @@ MEDULLA_FN PackStatus check_table(const TableView& view, std::uint64_t total) no
     const unsigned char *scale = view.bytes + table.scales_offset, *integral = view.bytes + table.integrals_offset;
     if (!finite(scale, table.rank_stride) || !finite(integral, integrals)) return PackStatus::bad_number;
     double reach = 0;  // double: 512 floats times 32767^6 are finite
-    for (std::uint32_t r = 0; r < table.rank_stride; ++r) reach += std::abs(double(load<float>(scale + 4 * r)));
+    for (std::uint32_t r = 0; r < table.rank_stride; ++r)
+        reach += detail::math::abs(double(load<float>(scale + 4 * r)));
     for (std::uint32_t k = 0; k < table.axis_count; ++k) reach *= greatest_number;
     if (!(reach <= double(most_reach))) return PackStatus::bad_number;
     // Both halves of the axis, of coefficients of at most greatest_number each; 1e-5 is the rounding of knots.
     const AxisView<float> exit = view.axis(view.parameter_axes());
     const double most = integrals > 0 ? 2 * greatest_number * double(exit.upper()) * (1 + 1e-5) : 0;
     for (std::uint32_t r = 0; r < integrals; ++r)
-        if (!(std::abs(double(load<float>(integral + 4 * r))) <= most)) return PackStatus::bad_number;
+        if (!(detail::math::abs(double(load<float>(integral + 4 * r))) <= most)) return PackStatus::bad_number;
     return PackStatus::ok;
 }
 

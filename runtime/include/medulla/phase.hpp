@@ -1,9 +1,8 @@
 // Planar Henyey-Greenstein phase function: pdf, sample, invert. docs/physics.md, section 1.
 #pragma once
 
-#include <cmath>
-
 #include "medulla/config.hpp"
+#include "medulla/detail/math.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {
@@ -26,7 +25,7 @@ MEDULLA_FN constexpr Direction<T> rotate(Direction<T> a, Direction<T> b) noexcep
 template <class T>
 MEDULLA_FN T planar_hg_pdf(T t, T g) noexcept {
     // 1 + g^2 - 2 g cos t = (1 - g)^2 + 4 g sin^2(t/2): no cancellation near t = 0. For g < 0 the mirrored form.
-    const T half = g < T(0) ? std::cos(t / T(2)) : std::sin(t / T(2));
+    const T half = g < T(0) ? detail::math::cos(t / T(2)) : detail::math::sin(t / T(2));
     const T a = g < T(0) ? -g : g;
     const T d = T(1) - a;
     return d * (T(1) + a) / (T(2 * pi) * (d * d + T(4) * a * half * half));

@@ -14,6 +14,7 @@
 #include <cstdint>
 
 #include "medulla/config.hpp"
+#include "medulla/detail/math.hpp"
 #include "medulla/detail/spline_axis.hpp"
 #include "medulla/fur_parameters.hpp"
 #include "medulla/pack.hpp"
@@ -36,7 +37,7 @@ struct TableRanges {
 template <int Channels>
 MEDULLA_FN TableRanges ranges_of(const FurParameters<Channels>& p) noexcept {
     const float radius = p.sigma_ms * p.kappa;
-    const float longest = p.eta / std::sqrt((p.eta - 1) * (p.eta + 1));  // 1 / cos theta_t at grazing
+    const float longest = p.eta / detail::math::sqrt((p.eta - 1) * (p.eta + 1));  // 1 / cos theta_t at grazing
     return {p.g, p.g, radius, radius * longest, p.sigma_ms > 0 ? p.sigma_ma / p.sigma_ms : 0.0f, p.eta};
 }
 /// The ranges that cover both. The absorption is a's: where the pack has an axis of it, materials that share tables

@@ -10,6 +10,7 @@
 #include "medulla/config.hpp"
 #include "medulla/detail/cross_section.hpp"
 #include "medulla/detail/gaussian.hpp"
+#include "medulla/detail/math.hpp"
 #include "medulla/fur_parameters.hpp"
 
 namespace medulla {
@@ -26,7 +27,7 @@ struct UnscatteredLobes {
 template <int Channels, class T>
 MEDULLA_FN UnscatteredLobes<Channels, T> unscattered_lobes(const FurParameters<Channels, T>& p, T theta_i, T theta_r,
                                                            T phi, T h) noexcept {
-    using std::cos;
+    using detail::math::cos;
     using namespace detail;
     const Inclination<T> at = inclination(p.eta, cos(theta_i), p.fresnel);
     const Path<T> path = trace(at, p.kappa, p.layers, h, square_root((T(1) - h) * (T(1) + h)));

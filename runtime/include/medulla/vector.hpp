@@ -6,11 +6,11 @@
 // y).
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/elementary.hpp"
+#include "medulla/detail/math.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {
@@ -40,18 +40,18 @@ struct Offsets {
 
 /// The papers' angles of a direction, which need not be of unit length.
 MEDULLA_FN Angles angles_of(Vector w) noexcept {
-    return {std::atan2(-w.x, std::sqrt(w.y * w.y + w.z * w.z)), std::atan2(w.z, w.y)};
+    return {detail::math::atan2(-w.x, detail::math::sqrt(w.y * w.y + w.z * w.z)), detail::math::atan2(w.z, w.y)};
 }
 MEDULLA_FN Vector direction_of(Angles a) noexcept {
-    const float c = std::cos(a.theta);
-    return {-std::sin(a.theta), c * std::cos(a.phi), c * std::sin(a.phi)};
+    const float c = detail::math::cos(a.theta);
+    return {-detail::math::sin(a.theta), c * detail::math::cos(a.phi), c * detail::math::sin(a.phi)};
 }
 
 /// Offset h of the ray along `known`: its distance from the fibre's axis, counted to the left of its direction of
 /// travel in the cross-section. @param point any point of the ray, from the axis [fibre radii]
 MEDULLA_FN float offset_of(Vector known, Vector point) noexcept {
     // Light that comes along `known` travels in (-y, -z); its left normal is (z, -y).
-    return (known.z * point.y - known.y * point.z) / std::sqrt(known.y * known.y + known.z * known.z);
+    return (known.z * point.y - known.y * point.z) / detail::math::sqrt(known.y * known.y + known.z * known.z);
 }
 
 /// Offsets that a round pixel covers (Eq. 27 of Yan et al. 2017), clamped to the fibre.
@@ -59,7 +59,7 @@ MEDULLA_FN float offset_of(Vector known, Vector point) noexcept {
 /// @param radius of the fibre [world units], > 0  @param cosine omega_fiber . omega_lookat, in practice that of the
 ///        angle between the camera's ray and its viewing axis
 MEDULLA_FN Offsets pixel_coverage(float h, float footprint, float radius, float cosine) noexcept {
-    const float half = 0.5f * std::abs(cosine) * footprint / radius;
+    const float half = 0.5f * detail::math::abs(cosine) * footprint / radius;
     const float low = h - half, high = h + half;
     return {low < -1 ? -1.0f : (low > 1 ? 1.0f : low), high > 1 ? 1.0f : (high < -1 ? -1.0f : high)};
 }
@@ -78,16 +78,17 @@ struct Polar {
 MEDULLA_HOT Polar polar_of(Vector w) noexcept {
     const float across2 = w.y * w.y + w.z * w.z, length2 = across2 + w.x * w.x;
     if (!within(length2, 1e30f) || !(length2 > 1e-30f)) return {};
-    const float inverse = 1 / std::sqrt(length2), across = std::sqrt(across2), cosine = across * inverse;
+    const float inverse = 1 / detail::math::sqrt(length2), across = detail::math::sqrt(across2),
+                cosine = across * inverse;
     if (!(cosine > least_cosine)) return {};
     const float inverse_across = 1 / across;
     return {-w.x * inverse, cosine, w.y * inverse_across, w.z * inverse_across};
 }
 MEDULLA_FN Polar polar_of(Angles a) noexcept {
     if (!within(a.theta, float(pi / 2)) || !within(a.phi, 1e4f)) return {};
-    const float cosine = std::cos(a.theta);
+    const float cosine = detail::math::cos(a.theta);
     if (!(cosine > least_cosine)) return {};
-    return {std::sin(a.theta), cosine, std::cos(a.phi), std::sin(a.phi)};
+    return {detail::math::sin(a.theta), cosine, detail::math::cos(a.phi), detail::math::sin(a.phi)};
 }
 
 /// A drawn direction's inclination, and its azimuth from the known one [radians].

@@ -2,9 +2,8 @@
 // lobe is nearly 0, and clamping them adds that much to its integral. Rests on blocks.hpp.
 #pragma once
 
-#include <cmath>
-
 #include "medulla/detail/blocks.hpp"
+#include "medulla/detail/math.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {
@@ -28,7 +27,7 @@ MEDULLA_FN float span_undershoot(const AxisView<float>& axis, std::uint32_t span
     int parts = 1;
     const float discriminant = p2 * p2 - 3 * p1 * p3;
     if (discriminant > 0) {
-        const float q = -(p2 + (p2 < 0 ? -std::sqrt(discriminant) : std::sqrt(discriminant)));
+        const float q = -(p2 + (p2 < 0 ? -detail::math::sqrt(discriminant) : detail::math::sqrt(discriminant)));
         const float s = q / (3 * p3), t = p1 / q;
         const float ascending[2] = {s < t ? s : t, s < t ? t : s};
         for (const float x : ascending)

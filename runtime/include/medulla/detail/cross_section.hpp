@@ -3,7 +3,6 @@
 // formula.
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 
 #include "medulla/config.hpp"

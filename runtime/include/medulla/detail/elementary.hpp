@@ -2,11 +2,11 @@
 // four at a time, branch-free polynomials (relative error < 4e-7).
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/lanes.hpp"
+#include "medulla/detail/math.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {
@@ -89,7 +89,7 @@ MEDULLA_FN T cosine(T x) noexcept {
 /// exp(x).
 template <class T>
 MEDULLA_FN T exponential(T x) noexcept {
-    using std::exp;
+    using detail::math::exp;
     return exp(x);
 }
 MEDULLA_FN float exponential(float x) noexcept { return polynomial::exponential(x); }
@@ -113,7 +113,7 @@ MEDULLA_FN void exponentials(float (&x)[n]) noexcept {
 /// 1 - exp(-x) for x >= 0, to full relative precision. @param left exp(-x)
 template <class T>
 MEDULLA_FN T absorbed(T x, T) noexcept {
-    using std::expm1;
+    using detail::math::expm1;
     return -expm1(-x);
 }
 MEDULLA_FN float absorbed(float x, float left) noexcept { return polynomial::absorbed(x, left); }
@@ -122,7 +122,7 @@ MEDULLA_FN Four absorbed(Four x, Four left) noexcept { return polynomial::absorb
 /// The angle in [-pi/2, pi/2] of the point (cosine >= 0, sine) on the unit circle.
 template <class T>
 MEDULLA_FN T angle(T sine, T cosine) noexcept {
-    using std::atan2;
+    using detail::math::atan2;
     return atan2(sine, cosine);
 }
 MEDULLA_FN float angle(float sine, float cosine) noexcept { return polynomial::angle(sine, cosine); }
@@ -141,8 +141,8 @@ MEDULLA_FN void angles(const float (&sine)[2], const float (&cosine)[2], float (
 /// Sine and cosine of an angle in [-pi/2, pi/2].
 template <class T>
 MEDULLA_FN SineCosine<T> sine_cosine(T x) noexcept {
-    using std::cos;
-    using std::sin;
+    using detail::math::cos;
+    using detail::math::sin;
     return {sin(x), cos(x)};
 }
 MEDULLA_FN SineCosine<float> sine_cosine(float x) noexcept { return polynomial::sine_cosine(x); }

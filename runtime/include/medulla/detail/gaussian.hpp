@@ -2,11 +2,11 @@
 // phi. Rests on Eqs. 5 and 7 of Yan et al. 2017; docs/bcsdf.md says why truncated and how the sums converge.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/elementary.hpp"
+#include "medulla/detail/math.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {
@@ -16,8 +16,8 @@ namespace detail {
 /// (the seventh is 7e-7 of the sum at x = 5).
 template <class T>
 MEDULLA_APART T scaled_erfc(T x) noexcept {
-    using std::erfc;
-    using std::exp;
+    using detail::math::erfc;
+    using detail::math::exp;
     if (x < T(5)) return exp(x * x) * erfc(x);
     const T u = T(0.5) / (x * x);
     const T sum = T(1) - u * (T(1) - T(3) * u * (T(1) - T(5) * u * (T(1) - T(7) * u * (T(1) - T(9) * u))));
@@ -28,7 +28,7 @@ MEDULLA_APART T scaled_erfc(T x) noexcept {
 /// whose centre lies far outside the interval still has a mass that is no underflow.
 template <class T>
 MEDULLA_APART T scaled_tail_mass(T from, T w) noexcept {
-    using std::exp;
+    using detail::math::exp;
     const T root_half = T(0.70710678118654752);
     const T to = from + w;
     // Short against the tail's length 1 / far: the two tails would cancel, so the density is integrated by four Gauss
@@ -50,7 +50,7 @@ MEDULLA_APART T scaled_tail_mass(T from, T w) noexcept {
 /// Mass of the standard normal between 0 and z >= 0.
 template <class T>
 MEDULLA_FN T normal_half_mass(T z) noexcept {
-    using std::erf;
+    using detail::math::erf;
     return T(0.5) * erf(z * T(0.70710678118654752));
 }
 /// Abramowitz and Stegun 7.1.26: absolute error 1e-7, and the masses it is used for are not small. For float or Four.
@@ -111,7 +111,7 @@ MEDULLA_FN TruncatedGaussian<T> truncated_gaussian(T centre, T deviation) noexce
 /// 2e-6 of a deviation. p, q = 0 count as 2^-26, 5.5 deviations out, which no float in (0, 1) reaches.
 MEDULLA_FN float normal_quantile(float p, float q) noexcept {
     const float least = 1.4901161e-8f, product = 4 * (p > least ? p : least) * (q > least ? q : least);
-    float w = -std::log(product), y;
+    float w = -detail::math::log(product), y;
     if (w < 5) {
         w -= 2.5f;
         y = 3.43273939e-7f + 2.81022636e-8f * w;
@@ -119,7 +119,7 @@ MEDULLA_FN float normal_quantile(float p, float q) noexcept {
         y = -0.00125372503f + (0.00021858087f + y * w) * w;
         y = 1.50140941f + (0.246640727f + (-0.00417768164f + y * w) * w) * w;
     } else {
-        w = std::sqrt(w) - 3;
+        w = detail::math::sqrt(w) - 3;
         y = 0.000100950558f - 0.000200214257f * w;
         y = -0.00367342844f + (0.00134934322f + y * w) * w;
         y = -0.0076224613f + (0.00573950773f + y * w) * w;
@@ -136,15 +136,17 @@ MEDULLA_APART float sample_tail(const TruncatedGaussian<float>& gaussian, float 
     const bool mirrored = gaussian.origin > 0;
     const float to_share = gaussian.peak * gaussian.deviation * 2.5066283f, v = mirrored ? 1 - u : u, left = 1 - v;
     float low = 0, high = 2 * edge * gaussian.inverse;
-    float d = -std::log(left > 1e-30f ? left : 1e-30f) / (gaussian.beyond + 1);
+    float d = -detail::math::log(left > 1e-30f ? left : 1e-30f) / (gaussian.beyond + 1);
     for (int i = 0; i < 60; ++i) {
         if (!(d > low && d < high)) d = 0.5f * (low + high);
         const float error = to_share * scaled_tail_mass(gaussian.beyond, d) - v;
         (error > 0 ? high : low) = d;
-        const float density = gaussian.peak * gaussian.deviation * std::exp(-0.5f * d * (d + 2 * gaussian.beyond));
+        const float density =
+            gaussian.peak * gaussian.deviation * detail::math::exp(-0.5f * d * (d + 2 * gaussian.beyond));
         const float next = density > 0 ? d - error / density : 0.5f * (low + high);
         // The density falls by e over 1 / beyond: steps are measured by that.
-        const bool done = std::abs(next - d) * (1 + gaussian.beyond) < 2e-6f || high - low < 1e-7f * std::abs(d);
+        const bool done =
+            detail::math::abs(next - d) * (1 + gaussian.beyond) < 2e-6f || high - low < 1e-7f * detail::math::abs(d);
         d = next > low && next < high ? next : (done ? d : 0.5f * (low + high));
         if (done) break;
     }
@@ -233,7 +235,7 @@ struct WrappedGaussian {
 template <class T>
 MEDULLA_FN WrappedGaussian<T> wrapped_gaussian(T deviation) noexcept {
     const T inverse = T(1) / deviation;
-    using std::exp;
+    using detail::math::exp;
     return {deviation, inverse, T(0.39894228040143268) * inverse, exp(T(-0.5) * deviation * deviation)};
 }
 

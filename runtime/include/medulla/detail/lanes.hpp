@@ -3,11 +3,11 @@
 // that a user keeps holds one: their layout is the same everywhere.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 
 #include "medulla/config.hpp"
+#include "medulla/detail/math.hpp"
 
 #if !defined(MEDULLA_NO_SIMD) && !defined(__CUDA_ARCH__) && !defined(__HIP_DEVICE_COMPILE__)
 #if defined(__SSE2__) || defined(_M_X64)
@@ -40,7 +40,7 @@ MEDULLA_FN std::uint32_t bits_of(float x) noexcept {
 MEDULLA_FN bool within(float x, float limit) noexcept { return (bits_of(x) & 0x7fffffffu) <= bits_of(limit); }
 /// The whole number nearest to a; what is too large to have a fraction, and a NaN, stays as it is.
 MEDULLA_FN float nearest_integer(float a) noexcept {
-    return within(a, 8388608.0f) ? float(std::int32_t(a + std::copysign(0.5f, a))) : a;
+    return within(a, 8388608.0f) ? float(std::int32_t(a + detail::math::copysign(0.5f, a))) : a;
 }
 
 #if defined(MEDULLA_SSE2)
@@ -244,7 +244,7 @@ MEDULLA_FN Four lesser(Four a, Four b) noexcept { return choose(a < b, a, b); }
 MEDULLA_FN Four zero_where(FourMask mask, Four a) noexcept { return choose(mask, Four(0.0f), a); }
 MEDULLA_FN Four only_where(FourMask mask, Four a) noexcept { return choose(mask, a, Four(0.0f)); }
 MEDULLA_FN Four square_root(Four a) noexcept {
-    return each([&](int i) { return std::sqrt(a.v[i]); });
+    return each([&](int i) { return detail::math::sqrt(a.v[i]); });
 }
 MEDULLA_FN Four magnitude(Four a) noexcept {
     return each([&](int i) { return a.v[i] < 0 ? -a.v[i] : a.v[i]; });
@@ -256,7 +256,7 @@ MEDULLA_FN Four nearest_integer(Four a) noexcept {
 }
 /// 2^k for whole k, -126 <= k <= 127.
 MEDULLA_FN Four power_of_two(Four k) noexcept {
-    return each([&](int i) { return std::ldexp(1.0f, int(k.v[i])); });
+    return each([&](int i) { return ::ldexpf(1.0f, int(k.v[i])); });
 }
 MEDULLA_FN bool any(FourMask mask) noexcept { return mask.v[0] || mask.v[1] || mask.v[2] || mask.v[3]; }
 MEDULLA_FN Four four_at(const float* x) noexcept { return Four(x[0], x[1], x[2], x[3]); }
@@ -307,7 +307,7 @@ MEDULLA_FN float lesser(float a, float b) noexcept { return a < b ? a : b; }
 MEDULLA_FN float zero_where(bool condition, float a) noexcept { return condition ? 0.0f : a; }
 template <class T>
 MEDULLA_FN T square_root(T a) noexcept {
-    using std::sqrt;
+    using detail::math::sqrt;
     return sqrt(a);
 }
 template <class T>
@@ -316,11 +316,11 @@ MEDULLA_FN T magnitude(T a) noexcept {
 }
 template <class T>
 MEDULLA_FN T nearest_integer(T a) noexcept {
-    using std::floor;
+    using detail::math::floor;
     return floor(a + T(0.5));
 }
-MEDULLA_HOT float magnitude(float a) noexcept { return std::fabs(a); }
-MEDULLA_HOT float with_sign(float x, float y) noexcept { return std::copysign(x, y); }
+MEDULLA_HOT float magnitude(float a) noexcept { return detail::math::abs(a); }
+MEDULLA_HOT float with_sign(float x, float y) noexcept { return detail::math::copysign(x, y); }
 MEDULLA_FN float power_of_two(float k) noexcept {
     const std::uint32_t bits = std::uint32_t(std::int32_t(k) + 127) << 23;
     float x;

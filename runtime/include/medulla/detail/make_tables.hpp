@@ -5,11 +5,11 @@
 // theta_i where sigma follows from it.
 #pragma once
 
-#include <cmath>
 #include <cstring>
 
 #include "medulla/config.hpp"
 #include "medulla/detail/clamped_integral.hpp"
+#include "medulla/detail/math.hpp"
 #include "medulla/detail/row_integral.hpp"
 #include "medulla/lookup.hpp"
 #include "medulla/tables.hpp"
@@ -26,7 +26,7 @@ inline constexpr std::uint32_t most_range_rows = 40, most_solved_rows = 128;
 /// axes are such that lobes differ from the factors' by a relative L2 of 3e-4 at most over a coat's ranges, and of 6e-4
 /// over the whole pack (tests/test_dense_tables.cpp); with steps twice as long it is 1e-3 and 8e-3.
 struct GStep {
-    MEDULLA_FN double operator()(double g) const noexcept { return 0.2 * (1 - std::abs(g)); }
+    MEDULLA_FN double operator()(double g) const noexcept { return 0.2 * (1 - detail::math::abs(g)); }
 };
 /// The axis of sqrt(sigma): lobes change with sigma / cos theta_r, over every scale of sigma; next to 0 they are
 /// linear.
@@ -46,15 +46,17 @@ struct TablesPlan {
 
 /// The optical radius of one material at theta_i.
 MEDULLA_FN double sigma_at(const TableRanges& r, double theta_i) noexcept {
-    const double sine = std::sin(theta_i) / double(r.eta), cosine = std::sqrt((1 - sine) * (1 + sine));
+    const double sine = detail::math::sin(theta_i) / double(r.eta),
+                 cosine = detail::math::sqrt((1 - sine) * (1 + sine));
     const double sigma = double(r.sigma_low) / cosine;
     return sigma < double(r.sigma_high) ? sigma : double(r.sigma_high);
 }
 /// Whether ranges are those of one material, and no wider.
 MEDULLA_FN bool of_one_material(const TableRanges& r) noexcept {
     if (!(r.eta > 1 && within(r.eta, 1e9f)) || r.g_high > r.g_low) return false;
-    const double high = double(r.sigma_low) * double(r.eta) / std::sqrt((double(r.eta) - 1) * (double(r.eta) + 1));
-    return std::abs(double(r.sigma_high) - high) <= 1e-5 * high;
+    const double high =
+        double(r.sigma_low) * double(r.eta) / detail::math::sqrt((double(r.eta) - 1) * (double(r.eta) + 1));
+    return detail::math::abs(double(r.sigma_high) - high) <= 1e-5 * high;
 }
 /// Knots beyond either end of an axis repeat it: the splines are the same, and the nodes of all rows lie within.
 MEDULLA_FN void clamp_ends(AxisPlan& plan) noexcept {
@@ -124,7 +126,7 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
         return fail(TablesStatus::bad_ranges);
     if (!plan.survival) r.absorption = 0;  // Eq. 20 has all of the absorption then
     // One optical radius is a range of a hundredth about it: rows need a span.
-    double low = std::sqrt(double(r.sigma_low)), high = std::sqrt(double(r.sigma_high));
+    double low = detail::math::sqrt(double(r.sigma_low)), high = detail::math::sqrt(double(r.sigma_high));
     const double widest = double(axis_of(plan.azimuthal, Quantity::sigma).upper());
     if (high < low * 1.01 + 1e-3) high = low * 1.01 + 1e-3;
     if (high > widest) {
@@ -140,8 +142,8 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     plan_axis(axis_of(plan.side[0], Quantity::theta_r), plan.axis[5]);
     t.one_material = of_one_material(asked) && plan.axis[3].spans + 3 <= most_solved_rows ? 1u : 0u;
     if (t.one_material) clamp_ends(plan.axis[3]);
-    if (!(std::abs(plan.axis[2].lower()) < 1e-6) || !(std::abs(plan.axis[3].lower()) < 1e-6) ||
-        !(plan.axis[3].upper() > 0.999999))
+    // Lookups take the sides of h and theta_i by their signs; beyond its upper end an axis clamps.
+    if (!(detail::math::abs(plan.axis[2].lower()) < 1e-6) || !(detail::math::abs(plan.axis[3].lower()) < 1e-6))
         return fail(TablesStatus::bad_axes);
     SplineAxis* const axes[6] = {&t.sigma, &t.g, &t.h, &t.theta_i, &t.phi, &t.theta_r};
     std::uint64_t at = sizeof(DenseTables);

@@ -2,9 +2,8 @@
 // A row is a cubic on a span, given by four B-spline coefficients; where they are all >= 0 so is the cubic.
 #pragma once
 
-#include <cmath>
-
 #include "medulla/config.hpp"
+#include "medulla/detail/math.hpp"
 #include "medulla/detail/spline_axis.hpp"
 
 namespace medulla {
@@ -48,7 +47,7 @@ MEDULLA_APART float positive_integral(const Cubic& f, float a, float b) noexcept
     int parts = 1;
     const float discriminant = f.p[2] * f.p[2] - 3 * f.p[1] * f.p[3];
     if (discriminant > 0) {
-        const float root = std::sqrt(discriminant), q = -(f.p[2] + (f.p[2] < 0 ? -root : root));
+        const float root = detail::math::sqrt(discriminant), q = -(f.p[2] + (f.p[2] < 0 ? -root : root));
         const float s = bits_of(f.p[3]) << 1 ? q / (3 * f.p[3]) : a, t = bits_of(q) << 1 ? f.p[1] / q : a;
         const float ascending[2] = {s < t ? s : t, s < t ? t : s};
         for (const float x : ascending)
@@ -88,7 +87,7 @@ MEDULLA_APART float invert_cut_span(const Cubic& f, float half, float mass, floa
         (error > 0 ? high : low) = x;
         const float density = f.at(x), next = x - error / (density > 0 ? density : 1.0f);
         const float to = density > 0 && next > low && next < high ? next : 0.5f * (low + high);
-        const bool done = std::abs(to - x) < 1e-6f * half;
+        const bool done = detail::math::abs(to - x) < 1e-6f * half;
         x = to;
         if (done) break;
     }

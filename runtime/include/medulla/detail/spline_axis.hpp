@@ -2,12 +2,12 @@
 // lies in the tables' own memory, at offsets from the axis itself. Rests on medulla/axis.hpp's coordinates.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
 #include "medulla/axis.hpp"
 #include "medulla/config.hpp"
 #include "medulla/detail/lanes.hpp"
+#include "medulla/detail/math.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {
@@ -112,8 +112,8 @@ struct AxisPlan {
         for (std::uint32_t n = spans; n <= most_stretches; ++n) {
             bool ends = true;
             for (std::uint32_t i = 1; ends && i < spans; ++i) {
-                const double u = (knot(std::int32_t(i)) - lower()) / length * n, whole = std::floor(u + 0.5);
-                ends = std::abs(u - whole) < 1e-3;
+                const double u = (knot(std::int32_t(i)) - lower()) / length * n, whole = detail::math::floor(u + 0.5);
+                ends = detail::math::abs(u - whole) < 1e-3;
             }
             if (ends) return n;
         }

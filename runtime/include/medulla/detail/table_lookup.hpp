@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "medulla/config.hpp"
+#include "medulla/detail/math.hpp"
 #include "medulla/detail/row_integral.hpp"
 #include "medulla/tables.hpp"
 
@@ -58,7 +59,7 @@ MEDULLA_HOT void set_offset(const DenseTables& t, float offset, TableRows& at) n
 }
 /// Sets the rows of sigma and theta_i. @param theta [radians]
 MEDULLA_HOT void set_inclination(const DenseTables& t, float sigma, float theta, TableRows& at) noexcept {
-    set_row(t.sigma, std::sqrt(sigma), at.sigma_first, at.sigma);
+    set_row(t.sigma, detail::math::sqrt(sigma), at.sigma_first, at.sigma);
     set_row(t.theta_i, chord_coordinate(magnitude(theta) * float(2 / pi)), at.theta_first, at.theta_i);
     at.longitudinal =
         t.one_material ? at.theta_first

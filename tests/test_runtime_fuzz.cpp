@@ -74,7 +74,7 @@ TEST_CASE("far field of a dense medulla that reaches the rim, next to grazing li
 TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
     const analytic::AnalyticPack pack;
     const char* wanted =
-        std::getenv("MEDULLA_FUZZ");  // fibres; each is asked some hundred times, near, far, by samples
+        std::getenv("MEDULLA_FUZZ");  // fibres; each is evaluated and sampled some hundred times, near and far
     const long fibres = wanted ? std::atol(wanted) : 2500;
     Inputs in(7);
     const test::OwnedTables wide(pack.view, {-0.95f, 0.95f, 0, 16, 0});

@@ -260,6 +260,22 @@ TEST_CASE("every row of dense tables integrates to 1, what is cut at 0 and all",
     }
 }
 
+TEST_CASE("weights of rows are not negative and add up to 1", "[bcsdf]") {
+    const OwnedTables tables(shipped(), {-0.3f, 0.8f, 0, 16, 0});
+    for (const detail::SplineAxis* axis : {&tables->sigma, &tables->g, &tables->h, &tables->theta_i}) {
+        const float length = axis->end / axis->scale;
+        float least = 1, most_off = 0;
+        for (int i = -10; i <= 100010; ++i) {
+            const detail::RowPoint p = axis->at(axis->lower + length * float(i) * 1e-5f);
+            float sum = 0;
+            for (int k = 0; k < 4; ++k) least = std::min(least, lane(p.weight, k)), sum += lane(p.weight, k);
+            most_off = std::max(most_off, std::abs(sum - 1));
+        }
+        CHECK(least >= 0);
+        CHECK(most_off < 3e-7f);  // four roundings
+    }
+}
+
 TEST_CASE("cutting a density at 0 hides no NaN", "[bcsdf]") {
     const FibreOf fibre(parameters_of<3>(*find_preset("cat")), shipped());
     const float nan = std::numeric_limits<float>::quiet_NaN();

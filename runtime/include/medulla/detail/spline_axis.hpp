@@ -72,10 +72,11 @@ struct SplineAxis {
         return {i, s.weights.at(Four(place - s.middle))};
     }
     /// Rows and weights at a spline coordinate; clamped to the ends of the axis. A NaN gives the lower end's rows and
-    /// NaN weights.
+    /// NaN weights. A weight that is 0 may round to -1e-8, which would make a lobe negative where all else is 0.
     MEDULLA_HOT RowPoint at(float coordinate) const noexcept {
         const float u = (coordinate - lower) * scale, v = u < 0 ? 0.0f : (u > end ? end : u);
-        return at_place(v > 0 ? std::uint32_t(std::int32_t(v)) : 0u, v);
+        const RowPoint p = at_place(v > 0 ? std::uint32_t(std::int32_t(v)) : 0u, v);
+        return {p.first, greater(Four(0.0f), p.weight)};
     }
 };
 static_assert(sizeof(SplineAxis) == 36, "one layout everywhere");

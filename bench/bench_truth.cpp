@@ -11,31 +11,13 @@
 #include <string>
 #include <vector>
 
-#include "bench/published_model.hpp"
 #include "sim3d/fibre_tracer.hpp"
+#include "sim3d/model/five_lobes.hpp"
 
 using namespace medulla;
 using namespace medulla::sim3d;
-using bench::Longitudinal;
 
 namespace {
-
-/// The same over phi alone, or theta_r alone, as a density of one row or column.
-DirectionalDensity marginal(const DirectionalDensity& d, bool over_phi) {
-    DirectionalDensity m;
-    m.theta_bins = over_phi ? 1 : d.theta_bins, m.phi_bins = over_phi ? d.phi_bins : 1;
-    m.value.assign(m.theta_bins * m.phi_bins, 0.0);
-    for (std::size_t i = 0; i < d.value.size(); ++i) m.value[over_phi ? i % d.phi_bins : i / d.phi_bins] += d.value[i];
-    return m;
-}
-
-DirectionalDensity product_of_marginals(const DirectionalDensity& d) {
-    const DirectionalDensity phi = marginal(d, true), theta = marginal(d, false);
-    DirectionalDensity p = d;
-    for (std::size_t i = 0; i < p.value.size(); ++i)
-        p.value[i] = theta.value[i / d.phi_bins] * phi.value[i % d.phi_bins];
-    return p;
-}
 
 /// |a - b| / |b| of densities as they are.
 double relative_distance(const DirectionalDensity& a, const DirectionalDensity& b) {
@@ -59,7 +41,7 @@ int main(int argc, char** argv) {
     app.add_option("--paths", options.paths, "paths per animal");
     app.add_option("--seed", options.seed);
     app.add_option("--theta-i", theta_i, "inclination of the light [degrees]");
-    app.add_option("--offset", h, "one ray, of this h; without: the far field");
+    app.add_option("--offset", h, "one ray, of this h; without: the far field")->check(CLI::Range(0.0, 1.0));
     app.add_flag("--smooth", smooth, "leave out the cuticle's tilt and roughness");
     app.add_option("--animal", animals, "these alone");
     app.add_option("--theta-bins", options.theta_bins);
@@ -83,18 +65,23 @@ int main(int argc, char** argv) {
         "noise | relative L2 of the scattered lobe: published, its shape, with the cosine\n");
     for (const FurPreset& preset : fur_presets) {
         if (!animals.empty() && std::find(animals.begin(), animals.end(), preset.name) == animals.end()) continue;
-        Fibre fibre = bench::fibre_of(preset);
+        Fibre fibre = fibre_of(parameters_of<3>(preset), 1);
         if (smooth) fibre.alpha = fibre.beta_m = fibre.beta_n = 0;
         const FibreProfile truth = trace_fibre(fibre, light, options);
-        const bench::PublishedModel model =
-            bench::published_model(fibre, light.theta_i, h, options.theta_bins, options.phi_bins);
+        const OffsetRange range = h ? OffsetRange{*h, *h} : OffsetRange{0, 1};
+        const FiveLobes model =
+            five_lobes(fibre, Reflectance::bravais, light.theta_i, {range}, options.theta_bins, options.phi_bins)[0];
+        const double model_energy = model.energy[0][3] + model.energy[0][4];
+        const auto shape = [&](Longitudinal which) {
+            const DirectionalDensity& d = model.scattered[0][std::size_t(which)];
+            return h ? d : folded(d);
+        };
         Fibre white = fibre;
         white.sigma_ca = {0}, white.sigma_ma = 0;
         FibreOptions fewer = options;
         fewer.paths = options.paths / 4 + 1;
         const Estimate white_truth = trace_fibre(white, light, fewer).energy(scattered);
-        const bench::PublishedModel white_model = bench::published_model(white, light.theta_i, h, 1, 1);
-        const double white_energy = white_model.energy[3] + white_model.energy[4];
+        const double white_energy = model.white[3] + model.white[4];
 
         nlohmann::json row = {
             {"animal", preset.name}, {"white_scattered", white_truth.value}, {"white_model", white_energy}};
@@ -111,22 +98,24 @@ int main(int argc, char** argv) {
             row["truth"].push_back({e.value, e.error});
         }
         std::printf(" |");
-        for (const double A : model.energy) std::printf(" %.3f", A), row["model"].push_back(A);
+        for (int k = 0; k < lobe_count; ++k)
+            std::printf(" %.3f", model.energy[0][std::size_t(k)]),
+                row["model"].push_back(model.energy[0][std::size_t(k)]);
         std::printf(" | %.3f(%.0f) %.3f\n", white_truth.value, std::ceil(white_truth.error * 1e3), white_energy);
 
         out["animals"].push_back(row);
-        if (!(model.energy[3] > 0)) continue;  // one ray that misses the medulla
+        if (!(model_energy > 0)) continue;  // one ray that misses the medulla
         const DirectionalDensity lobe = truth.density(scattered, 0, !h);
-        const DirectionalDensity& published = model.scattered[int(Longitudinal::house)];
-        const DirectionalDensity& cosine = model.scattered[int(Longitudinal::house_cosine)];
+        const DirectionalDensity published = shape(Longitudinal::house);
+        const DirectionalDensity cosine = shape(Longitudinal::house_cosine);
         DirectionalDensity scaled[2] = {published, cosine};
-        const double all = truth.energy(scattered).value / (model.energy[3] + model.energy[4]);
+        const double all = truth.energy(scattered).value / model_energy;
         for (DirectionalDensity& d : scaled)
             for (double& v : d.value) v *= all;
         const std::vector<double> numbers = {total_variation(lobe, published),
-                                             total_variation(lobe, model.scattered[int(Longitudinal::authors)]),
+                                             total_variation(lobe, shape(Longitudinal::authors)),
                                              total_variation(lobe, cosine),
-                                             total_variation(lobe, model.scattered[int(Longitudinal::authors_cosine)]),
+                                             total_variation(lobe, shape(Longitudinal::authors_cosine)),
                                              total_variation(marginal(lobe, true), marginal(cosine, true)),
                                              total_variation(marginal(lobe, false), marginal(cosine, false)),
                                              total_variation(lobe, product_of_marginals(lobe)),

@@ -146,6 +146,7 @@ std::vector<std::vector<FiveLobes>> models(const Fibre& fibre, Reflectance model
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t t = 0; t < map.theta_i.size(); ++t) try {
             all[t] = five_lobes(fibre, model, map.theta_i[t], map.offsets, options.theta_bins, options.phi_bins);
+            if (options.progress) options.progress();
         } catch (...) {
 #pragma omp critical
             error = std::current_exception();
@@ -156,7 +157,7 @@ std::vector<std::vector<FiveLobes>> models(const Fibre& fibre, Reflectance model
 
 }  // namespace
 
-std::size_t map_cells(const ErrorMapOptions& options) { return options.inclinations * (options.offsets + 1); }
+std::size_t map_cells(const ErrorMapOptions& options) { return options.inclinations * (options.offsets + 2); }
 
 ErrorMap error_map(const Fibre& fibre, Reflectance reflectance, const ErrorMapOptions& options) {
     FibreOptions work;

@@ -22,9 +22,10 @@ struct ErrorMapOptions {
     std::size_t theta_bins = 30;          ///< of the scattered lobe, a divisor of 180
     std::size_t phi_bins = 48;            ///< of the scattered lobe, even, a divisor of 1440
     std::size_t batches = 16;             ///< that standard errors come from
-    std::function<void()> progress = {};  ///< called after each cell, map_cells(options) times
+    std::function<void()> progress = {};  ///< called after each cell, from any thread, map_cells(options) times
 };
 
+/// Cells of the map, a smooth fibre and the model for every inclination.
 std::size_t map_cells(const ErrorMapOptions& options);
 
 /// One light and one colour channel: the truth against the model.

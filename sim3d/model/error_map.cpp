@@ -157,6 +157,12 @@ std::vector<std::vector<FiveLobes>> models(const Fibre& fibre, Reflectance model
 
 }  // namespace
 
+LightError light_error(const MeasuredLight& truth, const FiveLobes& model, double theta_i, const OffsetRange& offsets) {
+    std::vector<Resampled> resampled;
+    for (std::size_t c = 0; c < model.energy.size(); ++c) resampled.push_back(compared(truth, model, c));
+    return error_of(truth, model, resampled, theta_i, offsets);
+}
+
 std::size_t map_cells(const ErrorMapOptions& options) { return options.inclinations * (options.offsets + 2); }
 
 ErrorMap error_map(const Fibre& fibre, Reflectance reflectance, const ErrorMapOptions& options) {

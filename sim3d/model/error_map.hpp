@@ -49,6 +49,9 @@ struct LightError {
     std::vector<ChannelError> channels;
 };
 
+/// One light: the truth against the model's lobes of the same bins and channels.
+LightError light_error(const MeasuredLight& truth, const FiveLobes& model, double theta_i, const OffsetRange& offsets);
+
 /// What the error of the scattered light comes from, over light from all directions. Index 0: the far field, 1: single
 /// ranges of offsets.
 struct Causes {

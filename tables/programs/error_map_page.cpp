@@ -7,6 +7,7 @@
 #include "plot/figure.hpp"
 #include "tables/programs/error_map.hpp"
 #include "tables/programs/error_map_picture.hpp"
+#include "tables/programs/error_map_style.hpp"
 
 namespace medulla::tables {
 namespace {
@@ -16,42 +17,6 @@ using sim3d::Distance;
 using sim3d::Estimate;
 
 constexpr double degrees = 180 / pi;
-
-constexpr const char* style = R"(
-:root{color-scheme:light dark;--ink:#1b1b1b;--soft:#5c5c5c;--line:#c9c9c9;--paper:#fff;--model:#c24e00;--cosine:#0072b2}
-@media(prefers-color-scheme:dark){:root{--ink:#e6e6e6;--soft:#a3a3a3;--line:#474747;--paper:#161616;--model:#ff8a3d;--cosine:#6cc3f0}}
-*{box-sizing:border-box}
-body{margin:0 auto;max-width:68rem;padding:1rem;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,sans-serif}
-h1{font-size:1.5rem;line-height:1.25;margin:.3em 0}h2{font-size:1.2rem;margin:2em 0 .4em}h3{font-size:1rem;margin:1.4em 0 .3em}
-p{max-width:46rem;margin:.5em 0}.note{color:var(--soft);font-size:.875rem}
-sub,sup{line-height:0}.wrap{overflow-x:auto;margin:.6em 0}
-table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.9375rem}
-th,td{padding:.2em .6em;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
-th{font-weight:600}thead th{vertical-align:bottom}
-th:first-child,td:first-child{text-align:left;white-space:normal}
-.why{display:block;color:var(--soft);font-size:.8125rem;line-height:1.3;padding-bottom:.15em}
-tr.part td:first-child{padding-left:1.4em;color:var(--soft)}tr.sum>*{border-top:2px solid var(--line);font-weight:600}
-small{color:var(--soft);font-size:.8em}
-.quiet{color:var(--soft)}
-.map{font-size:.8125rem;line-height:1.2}
-.map td{padding:.2em .1em;text-align:center;border:1px solid var(--paper);width:3.9em}
-.map td small{display:block;color:inherit;opacity:.8;font-size:.78em}
-.map th{padding:.1em .3em;border:0;font-weight:400;color:var(--soft);text-align:center;white-space:nowrap}
-.map td.blank{background:repeating-linear-gradient(45deg,transparent 0 4px,var(--line) 4px 5px);color:var(--ink)}
-.lobes,.charts{display:grid;gap:1rem;grid-template-columns:repeat(auto-fit,minmax(15rem,1fr))}
-figure{margin:0}figcaption{font-size:.875rem}
-svg{width:100%;height:auto;display:block;font:11px system-ui,sans-serif;fill:var(--ink);background:var(--paper)}
-.frame,.grid{fill:none;stroke:var(--soft)}.grid{stroke:var(--line);stroke-width:.5}
-.bar{display:flex;gap:.5em;align-items:center;font-size:.8125rem}.bar i{flex:1;height:.6em}
-polyline{fill:none;stroke-width:1.6}
-.truth,.truth polyline{stroke:var(--ink);color:var(--ink);fill:var(--ink)}
-.model,.model polyline{stroke:var(--model);color:var(--model);fill:var(--model)}
-.cosine,.cosine polyline{stroke:var(--cosine);color:var(--cosine);fill:var(--cosine)}
-svg polyline{fill:none!important}
-.key{display:flex;flex-wrap:wrap;gap:0 1em;font-size:.875rem}.key span:before{content:"● "}
-@media(max-width:480px){body{padding:.75rem}table{font-size:.8125rem}th,td{padding:.2em .3em}
-.map{font-size:.6875rem}.map td{width:auto;padding:.2em 0}.map th{padding:.1em .15em}table:not(.map) small{display:block;line-height:1.1}table:not(.map) td:first-child{min-width:3rem}}
-)";
 
 std::string escaped(const std::string& text) {
     std::string out;
@@ -212,7 +177,11 @@ std::string map_table(const std::string& title, const std::string& text, const s
         html += fmt::format("<th>{}{:.3g}</th>", theta < -1e-9 ? "−" : "", std::abs(theta * degrees));
     html += "</tr></thead><tbody>";
     for (std::size_t i = 0; i < map.offsets.size(); ++i) {
-        html += fmt::format("<tr><th>{:.3g}–{:.3g}</th>", map.offsets[i].low, map.offsets[i].high);
+        const auto end = [](double h) {
+            const std::string number = fmt::format("{:.3g}", h);
+            return number.rfind("0.", 0) == 0 ? number.substr(1) : number;
+        };
+        html += fmt::format("<tr><th>{}–{}</th>", end(map.offsets[i].low), end(map.offsets[i].high));
         for (std::size_t t = 0; t < map.theta_i.size(); ++t) {
             const MapCell c = cell(map.cells[t * map.offsets.size() + i]);
             if (!c.defined)
@@ -235,7 +204,7 @@ std::string short_number(double x, int digits) {
 
 MapCell distance_map_cell(const Distance& d) {
     if (!d.defined) return {false, false, "", "", {}};
-    if (!d.resolved()) return {true, false, "&lt; " + short_number(d.bound(), 2), "noise"};
+    if (!d.resolved()) return {true, false, "&lt;" + short_number(d.bound(), 2), "noise"};
     return {true, true, short_number(d.value(), 2), "±" + short_number(d.error(), 3), plain_scale(d.value())};
 }
 
@@ -246,8 +215,7 @@ MapCell energy_map_cell(double model, const Estimate& truth, double reach) {
     cell.resolved = std::abs(d) > 2 * truth.error;
     cell.value = (d < 0 ? "−" : "+") + short_number(std::abs(d), digits);
     if (cell.value.find_first_not_of("+−.0") == std::string::npos) cell.value = short_number(0, digits);
-    cell.error =
-        cell.resolved ? "±" + short_number(std::max(truth.error, 0.0001), truth.error < 0.0095 ? 4 : 3) : "noise";
+    cell.error = cell.resolved ? "±" + short_number(truth.error, truth.error < 9.5e-4 ? 4 : 3) : "noise";
     cell.colour = signed_scale(d / reach);
     return cell;
 }
@@ -403,7 +371,7 @@ std::string error_map_page(const ErrorMapTitle& title, const sim3d::ErrorMap& ma
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
         "content=\"width=device-width,initial-scale=1\"><title>{0}: five-lobe model against light in the fibre</title>"
         "<style>{1}</style></head><body>\n<h1>{0}: the five-lobe model against light in the fibre</h1>\n<p>{2}</p>\n",
-        name, style, answer(map.all.channels[shown]));
+        name, error_map_style, answer(map.all.channels[shown]));
     html +=
         "<h2>Energy</h2><p class=\"note\">Light from all directions alike, at all offsets; shares of the light that "
         "meets the fibre.</p>";

@@ -167,6 +167,8 @@ class ErrorMap(unittest.TestCase):
         light = json.loads(done.stdout)["all_directions"][0]
         self.assertIsNone(light["lobe"])
         self.assertGreater(light["model"]["TT"], 0.3)
+        done = self.run_in("--fibre", "hair.json", "--error-map", "hair.html", "--paths", 160, "--progress", "none")
+        self.assertRegex(done.stdout, r"grey: R 0\.\d+ \+- 0\.\d+, model 0\.\d+; next to no scattered light\n")
         self.assertIn("Nothing scatters.", Page(self.read("hair.html")).text)
 
     def fails(self, status, *args, parts=()):
@@ -194,7 +196,7 @@ class ErrorMap(unittest.TestCase):
         self.fails(1, "--fibre", ".", *page, parts=["."])
         self.fails(1, "--fibre", "m.json", "--error-map", "m.json", parts=["m.json", "input"])
         self.fails(1, "--fibre", "mouse", "--error-map", "none/x.html", parts=["none"])
-        for field, value, parts in (("alpha", 60, ["degrees in [-45, 45]", "60"]), ("beta_m", 120, ["degrees", "120"]),
+        for field, value, parts in (("alpha", 60, ["degrees in (-45, 45)", "60"]), ("beta_m", 120, ["degrees", "120"]),
                                     ("eta", 0.5, ["(1, 10]", "0.5"]), ("sigma_ms", 500, ["optical radius", "50"]),
                                     ("colour", 1, ["no such field"]), ("sigma_ca", "x", ["number"])):
             with open(os.path.join(self.folder.name, "bad.json"), "w") as f:

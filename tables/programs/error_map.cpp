@@ -29,13 +29,13 @@ Material fibre_named(const std::string& fibre, bool is_preset) {
     Material material = is_preset ? preset_material(fibre, "--fibre") : read_material(fibre);
     const FurParameters<3>& p = material.fur;
     const auto within = [&](const char* field, double found, double low, double high) {
-        if (!(found >= low && found <= high))
-            throw Error("{}: /{}: expected degrees in [{:g}, {:g}] for --error-map, found {:g}", fibre, field, low,
+        if (!(found > low && found < high))
+            throw Error("{}: /{}: expected degrees in ({:g}, {:g}) for --error-map, found {:g}", fibre, field, low,
                         high, found);
     };
     within("alpha", double(p.alpha) * degrees, -45, 45);
-    within("beta_m", double(p.beta_m) * degrees, 0, 114);
-    within("beta_n", double(p.beta_n) * degrees, 0, 114);
+    within("beta_m", double(p.beta_m) * degrees, 0, 114.5);
+    within("beta_n", double(p.beta_n) * degrees, 0, 114.5);
     const double sine = std::cos(pi / double(sim3d::ErrorMapOptions{}.inclinations + 1)) / double(p.eta);  // steepest
     const double radius = double(p.sigma_ms) * double(p.kappa) / std::sqrt((1 - sine) * (1 + sine));
     if (!(radius <= greatest_grid_sigma))
@@ -69,6 +69,11 @@ void run_error_map(const ErrorMapArguments& args) {
     print_messages();
     for (std::size_t c = 0; c < title.channels(); ++c) {
         const sim3d::ChannelError& e = map.all.channels[c];
+        if (!e.lobe.defined) {
+            print("{}: R {:.4f} +- {:.4f}, model {:.4f}; next to no scattered light\n", title.channel(c),
+                  e.truth[0].value, e.truth[0].error, e.model[0]);
+            continue;
+        }
         print(
             "{}: scattered {:.4f} +- {:.4f}, model {:.4f}; relative L2 error of the scattered lobe {:.3f}, of its "
             "shape {:.3f}, with cos theta_r {:.3f}\n",

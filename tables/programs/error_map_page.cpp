@@ -291,21 +291,22 @@ std::string directions(const ErrorMapTitle& title, const sim3d::ErrorMap& map, s
     const double alpha = double(title.material.fur.alpha) * degrees, beta = double(title.material.fur.beta_m) * degrees;
     const double shift[] = {alpha, -alpha / 2, -1.5 * alpha}, deviation[] = {beta, beta / 2, 1.5 * beta};
     std::string rows;
-    const auto cell = [](const Estimate& e) {
+    const auto cell = [](const Estimate& e, bool with_sign) {
         if (e.error == 0 && e.value == 0) return std::string("<td class=\"quiet\">too little light</td>");
-        return fmt::format("<td>{} <small>{}</small></td>", signed_text(e.value * degrees, 2),
-                           noise(e.error * degrees));
+        const double angle = e.value * degrees;
+        return fmt::format("<td>{} <small>{}</small></td>",
+                           with_sign ? signed_text(angle, 2) : fmt::format("{:.2f}", angle), noise(e.error * degrees));
     };
     for (const auto& light : map.far) {
         rows +=
             fmt::format("<tr><td>{}{:.3g}</td>", light.theta_i < -1e-9 ? "−" : "", std::abs(light.theta_i * degrees));
         for (std::size_t p = 0; p < 3; ++p)
-            rows += cell(light.channels[channel].shift[p]) + cell(light.channels[channel].deviation[p]);
+            rows += cell(light.channels[channel].shift[p], true) + cell(light.channels[channel].deviation[p], false);
         rows += "</tr>";
     }
     std::string model = "<tr class=\"sum\"><td>model</td>";
     for (std::size_t p = 0; p < 3; ++p)
-        model += fmt::format("<td>{}</td><td>{}</td>", signed_text(shift[p], 2), signed_text(deviation[p], 2));
+        model += fmt::format("<td>{}</td><td>{:.2f}</td>", signed_text(shift[p], 2), deviation[p]);
     return "<div class=\"wrap\"><table><thead><tr><th>θ<sub>i</sub></th><th>R<br>shift</th><th>deviation</th><th>TT<br>"
            "shift</th><th>deviation</th><th>TRT<br>shift</th><th>deviation</th></tr></thead><tbody>" +
            rows + model + "</tr></tbody></table></div>";
@@ -345,13 +346,14 @@ std::string work(const ErrorMapTitle& title, const sim3d::ErrorMap& map) {
         p.kappa, p.eta, double(p.alpha) * degrees, double(p.beta_m) * degrees, double(p.beta_n) * degrees, p.layers,
         sigma_ca, p.sigma_ms, p.sigma_ma, p.g, p.fresnel == Fresnel::exact ? "exact" : "published");
     html += fmt::format(
-        "<p>Truth: {:.3g} paths through the fibre in three dimensions (smooth fibre included), {} for each cell of the "
+        "<p>Truth: {:.3g} million paths through the fibre in three dimensions (smooth fibre included), {} for each "
+        "cell of the "
         "maps, seed {}; rough tilted cuticle, absorbing cortex, scattering and absorbing medulla. Model: Yan et al. "
         "2017 straight from the formulas, with C<sup>N</sup> and C<sup>M</sup> of the noise-free solvers: no table, no "
         "pack. Lobes are densities per radian² of (θ<sub>r</sub>, φ) in bins of {:.3g}° × {:.3g}°. Relative L2 error: "
         "|model − truth| / |truth| over the bins, the truth’s noise subtracted. ± is one standard error of the truth, "
         "from 16 batches; the model has no noise.</p>",
-        double(map.paths), title.paths, title.seed, 180.0 / double(map.pictures[0].truth.theta_bins),
+        double(map.paths) * 1e-6, title.paths, title.seed, 180.0 / double(map.pictures[0].truth.theta_bins),
         360.0 / double(map.pictures[0].truth.phi_bins));
     if (map.lost.value > 1e-4)
         html += fmt::format(
@@ -393,7 +395,7 @@ std::string error_map_page(const ErrorMapTitle& title, const sim3d::ErrorMap& ma
             of_shown + "</p>" + maps(map, shown) + "\n";
     html +=
         "<h2>Lobes of scattered light</h2><p class=\"note\">φ = 0 is back towards the light. In the differences, "
-        "red: the model has too much; blue: too little; blank: less than twice the standard error of the bin." +
+        "red: the model has too much; blue: too little; grey: less than twice the standard error of the bin." +
         of_shown + "</p>";
     for (const bool far : {true, false})
         for (const sim3d::LobePicture& p : map.pictures) {

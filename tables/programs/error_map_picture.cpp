@@ -44,9 +44,9 @@ std::string bins_svg(const sim3d::DirectionalDensity& d, const std::vector<doubl
                     fmt::format("M{} {}h{}v1h-{}z", b, d.theta_bins - 1 - t, end - b, end - b);
             b = end;
         }
-    std::string svg =
-        fmt::format("<g transform=\"translate(34 6) scale({:.4g} {:.4g})\" shape-rendering=\"crispEdges\">",
-                    288.0 / double(d.phi_bins), 144.0 / double(d.theta_bins));
+    std::string svg = "<path class=\"blank\" d=\"M34 6h288v144h-288z\"/>";
+    svg += fmt::format("<g transform=\"translate(34 6) scale({:.4g} {:.4g})\" shape-rendering=\"crispEdges\">",
+                       288.0 / double(d.phi_bins), 144.0 / double(d.theta_bins));
     for (int k = 0; k <= levels; ++k)
         if (!path[std::size_t(k)].empty())
             svg += fmt::format("<path fill=\"{}\" d=\"{}\"/>", scale(double(k) / levels).hex(), path[std::size_t(k)]);

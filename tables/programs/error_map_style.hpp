@@ -27,7 +27,7 @@ small{color:var(--soft);font-size:.8em}
 .lobes,.charts{display:grid;gap:1rem;grid-template-columns:repeat(auto-fit,minmax(15rem,1fr))}
 figure{margin:0}figcaption{font-size:.875rem}
 svg{width:100%;height:auto;display:block;font:11px system-ui,sans-serif;fill:var(--ink);background:var(--paper)}
-.frame,.grid{fill:none;stroke:var(--soft)}.grid{stroke:var(--line);stroke-width:.5}
+.blank{fill:var(--line)}.frame,.grid{fill:none;stroke:var(--soft)}.grid{stroke:var(--line);stroke-width:.5}
 .bar{display:flex;gap:.5em;align-items:center;font-size:.8125rem}.bar i{flex:1;height:.6em}
 polyline{fill:none;stroke-width:1.6}
 .truth,.truth polyline{stroke:var(--ink);color:var(--ink);fill:var(--ink)}

@@ -262,8 +262,8 @@ void declare(CLI::App& app, Arguments& args) {
     app.add_option(
         "--error-map", args.error_map,
         "in place of tables: write a page (HTML) of where the five-lobe model of --fibre differs from light in "
-        "the fibre in three dimensions, and by how much; --paths for each of its 88 cells, as many for the far "
-        "field of a smooth cuticle");
+        "the fibre in three dimensions, and by how much; --paths are traced for each of 88 cells (theta_i, h), and as "
+        "many again in a smooth fibre");
     app.add_flag("--dry-run", args.dry_run, "print what would be simulated and how long it would take; write nothing");
     add_number(app, "--bins", args.bins, "exit directions over the full circle, even", {8, 4096})
         ->capture_default_str();

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "sim3d/fibre_tracer.hpp"
-#include "sim3d/model/five_lobes.hpp"
+#include "sim3d/model/error_map.hpp"
 
 using namespace medulla;
 using namespace medulla::sim3d;
@@ -27,6 +27,36 @@ double relative_distance(const DirectionalDensity& a, const DirectionalDensity& 
     return std::sqrt(d / n);
 }
 
+/// --sigma: at which sigma C^M times cos theta_r is nearer to the truth, sigma_ms kappa / cos theta_t or sigma_ms
+/// kappa: relative L2 errors of the scattered shape over light from all directions, with the noise of their difference.
+nlohmann::json compare_sigma(const FurPreset& preset, std::uint64_t paths, std::uint64_t seed) {
+    ErrorMapOptions options;
+    options.paths = paths, options.seed = seed;
+    const ErrorMap map = error_map(fibre_of(parameters_of<3>(preset), 1), Reflectance::bravais, options);
+    const Causes& causes = map.causes[0];
+    nlohmann::json row = {{"animal", preset.name}};
+    std::printf("%-9s |", preset.name);
+    for (const std::size_t near : {0u, 1u}) {
+        const Distance &house = causes.shape[near][std::size_t(Longitudinal::house_cosine)],
+                       &authors = causes.shape[near][std::size_t(Longitudinal::authors_cosine)];
+        const Estimate &lobe = causes.sigma[near], &over_theta = causes.sigma_over_theta[near];
+        std::printf(" %.4f %.4f %+.2f(%.2f) %+.2f(%.2f) |", house.value(), authors.value(), lobe.value * 1e3,
+                    lobe.error * 1e3, over_theta.value * 1e3, over_theta.error * 1e3);
+        row[near ? "offsets" : "far"] = {{"over_cos", {house.value(), house.error()}},
+                                         {"plain", {authors.value(), authors.error()}},
+                                         {"difference", {lobe.value, lobe.error}},
+                                         {"difference_over_theta_r", {over_theta.value, over_theta.error}}};
+    }
+    for (const LightError& light : map.far) {
+        const Estimate& e = light.channels[0].sigma;
+        row["by_theta_i"].push_back({light.theta_i * 180 / pi, e.value, e.error});
+        std::printf(" %+.1f(%.1f)", e.value * 1e3, e.error * 1e3);
+    }
+    std::printf("\n");
+    std::fflush(stdout);
+    return row;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -34,7 +64,7 @@ int main(int argc, char** argv) {
     options.paths = 4000000, options.theta_bins = 60, options.phi_bins = 96;
     double theta_i = -40;
     std::optional<double> h;
-    bool smooth = false;
+    bool smooth = false, sigma = false;
     std::string json;
     std::vector<std::string> animals;
     CLI::App app("The published model against light in the whole fibre");
@@ -43,6 +73,7 @@ int main(int argc, char** argv) {
     app.add_option("--theta-i", theta_i, "inclination of the light [degrees]");
     app.add_option("--offset", h, "one ray, of this h; without: the far field")->check(CLI::Range(0.0, 1.0));
     app.add_flag("--smooth", smooth, "leave out the cuticle's tilt and roughness");
+    app.add_flag("--sigma", sigma, "instead: which sigma C^M wants, over light from all directions; --paths per cell");
     app.add_option("--animal", animals, "these alone");
     app.add_option("--theta-bins", options.theta_bins);
     app.add_option("--phi-bins", options.phi_bins);
@@ -53,6 +84,19 @@ int main(int argc, char** argv) {
     light.theta_i = theta_i * pi / 180;
     if (h) light.h_low = light.h_high = *h;
     nlohmann::json out;
+    const auto wanted = [&](const FurPreset& preset) {
+        return animals.empty() || std::find(animals.begin(), animals.end(), preset.name) != animals.end();
+    };
+    if (sigma) {
+        std::printf(
+            "C^M times cos theta_r, relative L2 of the scattered shape: at sigma_ms kappa / cos theta_t, at sigma_ms "
+            "kappa, 1000 times the second's square minus the first's (standard error), the same over theta_r alone | "
+            "single offsets | 1000 times the difference in the far field by theta_i, -75 to 75 degrees\n");
+        for (const FurPreset& preset : fur_presets)
+            if (wanted(preset)) out["animals"].push_back(compare_sigma(preset, options.paths, options.seed));
+        if (!json.empty()) std::ofstream(json) << out.dump(1) << '\n';
+        return 0;
+    }
     std::printf("theta_i = %g degrees, %s, %s cuticle, %.3g paths an animal, bins of %.3g x %.3g degrees\n", theta_i,
                 h ? "one ray" : "far field", smooth ? "smooth" : "rough", double(options.paths),
                 180.0 / double(options.theta_bins), 360.0 / double(options.phi_bins));
@@ -64,7 +108,7 @@ int main(int argc, char** argv) {
         "at the authors' sigma | with the cosine: over phi, over theta_r | of the product of its own marginals | "
         "noise | relative L2 of the scattered lobe: published, its shape, with the cosine\n");
     for (const FurPreset& preset : fur_presets) {
-        if (!animals.empty() && std::find(animals.begin(), animals.end(), preset.name) == animals.end()) continue;
+        if (!wanted(preset)) continue;
         Fibre fibre = fibre_of(parameters_of<3>(preset), 1);
         if (smooth) fibre.alpha = fibre.beta_m = fibre.beta_n = 0;
         const FibreProfile truth = trace_fibre(fibre, light, options);

@@ -149,6 +149,16 @@ TEST_CASE("Error map: a model that is the truth has no error beyond the noise", 
         CHECK(std::abs(wrong.channels[0].lobe.square.value - 0.01) <=
               5 * wrong.channels[0].lobe.square.error + 1.21 * biased / 50);
         CHECK(wrong.channels[0].shape.square.value == Approx(e.shape.square.value).epsilon(1e-9));
+
+        // sigma of C^M: where one lobe is the truth and the other is turned over, the difference of squares is the
+        // distance of the two.
+        FiveLobes either = as_model(exact);
+        std::vector<double>& other = either.scattered[0][std::size_t(Longitudinal::authors_cosine)].value;
+        std::reverse(other.begin(), other.end());
+        const Squares apart = squares(other, 1, exact.all.channels[0].scattered, 1);
+        const Estimate sigma = light_error(truth, either, 0.5, {0.25, 0.5}).channels[0].sigma;
+        CHECK(std::abs(sigma.value - apart.difference / apart.norm) <= 5 * sigma.error + 0.02 * sigma.value);
+        CHECK(sigma.value > 10 * sigma.error);
     }
 }
 

@@ -16,7 +16,17 @@ namespace {
 constexpr std::size_t fine_theta = 180;
 
 /// What is compared of one scattered lobe.
-enum Measure : std::size_t { shape, over_phi = longitudinal_count, over_theta, product, whole, measure_count };
+enum Measure : std::size_t {
+    shape,
+    over_phi = longitudinal_count,
+    over_theta,
+    over_theta_authors,
+    product,
+    whole,
+    measure_count
+};
+constexpr std::size_t house_cosine = shape + std::size_t(Longitudinal::house_cosine);
+constexpr std::size_t authors_cosine = shape + std::size_t(Longitudinal::authors_cosine);
 using Measures = std::array<Squares, measure_count>;
 
 /// The same for all batches and for all but one: [batch left out, none].
@@ -30,6 +40,13 @@ struct Resampled {
     }
     Distance get(std::size_t measure) const {
         return distance(of.size() - 1, [&](std::size_t k) { return of[k][measure]; });
+    }
+    /// Square of one relative distance minus that of another.
+    Estimate between(std::size_t one, std::size_t other) const {
+        return jackknife(of.size() - 1, [&](std::size_t k) {
+            const double norm = of[k][one].norm;
+            return norm > 0 ? (of[k][one].difference - of[k][other].difference) / norm : 0;
+        });
     }
 };
 
@@ -50,6 +67,7 @@ Resampled compared(const MeasuredLight& truth, const FiveLobes& model, std::size
     const auto& variants = model.scattered[channel];
     const DirectionalDensity& cosine = variants[std::size_t(Longitudinal::house_cosine)];
     const DirectionalDensity cosine_phi = marginal(cosine, true), cosine_theta = marginal(cosine, false);
+    const DirectionalDensity authors_theta = marginal(variants[std::size_t(Longitudinal::authors_cosine)], false);
     for (std::size_t k = 0; k <= truth.without.size(); ++k) {
         const ChannelLight& light = replicate(truth, k).channels[channel];
         const DirectionalDensity lobe = density_of(truth, light.scattered);
@@ -61,6 +79,7 @@ Resampled compared(const MeasuredLight& truth, const FiveLobes& model, std::size
                 m[shape + v] = squares(variants[v].value, scale, lobe.value, 1);
             m[over_phi] = squares(cosine_phi.value, scale, marginal(lobe, true).value, 1);
             m[over_theta] = squares(cosine_theta.value, scale, marginal(lobe, false).value, 1);
+            m[over_theta_authors] = squares(authors_theta.value, scale, marginal(lobe, false).value, 1);
             m[product] = squares(product_of_marginals(lobe).value, 1, lobe.value, 1);
         }
         r.of.push_back(m);
@@ -100,7 +119,7 @@ LightError error_of(const MeasuredLight& truth, const FiveLobes& model, const st
         for (std::size_t k = 0; k < class_count; ++k) e.truth[k] = energy_of(truth, c, k);
         e.scattered = scattered_of(truth, c), e.model = model.energy[c];
         e.lobe = resampled[c].get(whole), e.shape = resampled[c].get(shape);
-        e.cosine = resampled[c].get(shape + std::size_t(Longitudinal::house_cosine));
+        e.cosine = resampled[c].get(house_cosine), e.sigma = resampled[c].between(authors_cosine, house_cosine);
         error.channels.push_back(e);
     }
     return error;
@@ -254,6 +273,8 @@ ErrorMap error_map(const Fibre& fibre, Reflectance reflectance, const ErrorMapOp
             for (std::size_t v = 0; v < longitudinal_count; ++v) causes.shape[near][v] = r.get(shape + v);
             causes.over_phi[near] = r.get(over_phi), causes.over_theta[near] = r.get(over_theta);
             causes.product[near] = r.get(product);
+            causes.sigma[near] = r.between(authors_cosine, house_cosine);
+            causes.sigma_over_theta[near] = r.between(over_theta_authors, over_theta);
         }
         causes.cuticle = distance(options.batches, [&](std::size_t k) { return cuticle[c][k]; });
         // E = W S: the share W that is scattered, and the share S of it that is not absorbed.

@@ -36,6 +36,9 @@ struct ChannelError {
     Distance lobe;                                  ///< of the scattered lobe as it is
     Distance shape;   ///< of the model's scattered lobe times a factor that makes its energy the truth's
     Distance cosine;  ///< the same with C^M times cos theta_r
+    /// Square of the same with C^M at sigma_ms kappa, minus that of `cosine`: linear in the truth, so that its noise
+    /// has no bias to subtract. Above 0, sigma_ms kappa / cos theta_t is nearer to the truth.
+    Estimate sigma;
     /// Of the far field of one inclination, R, TT, TRT: mean of theta_r + theta_i, and deviation of theta_r [radians];
     /// errors of 0 and values of 0 where there is too little light. The model's are alpha_p and beta_p of Table 2.
     std::array<Estimate, 3> shift = {}, deviation = {};
@@ -57,8 +60,9 @@ LightError light_error(const MeasuredLight& truth, const FiveLobes& model, doubl
 struct Causes {
     std::array<std::array<Distance, longitudinal_count>, 2> shape;  ///< by Longitudinal
     std::array<Distance, 2> over_phi, over_theta;                   ///< of the marginals, with the cosine
-    std::array<Distance, 2> product;  ///< of the truth from the product of its own marginals
-    Distance cuticle;                 ///< far field: of light in a smooth fibre from the truth
+    std::array<Distance, 2> product;                  ///< of the truth from the product of its own marginals
+    std::array<Estimate, 2> sigma, sigma_over_theta;  ///< as ChannelError::sigma, of the lobe and of its marginal
+    Distance cuticle;                                 ///< far field: of light in a smooth fibre from the truth
     Estimate entering;   ///< model - truth of the scattered energy, because another share of light is scattered
     Estimate absorbing;  ///< the rest of it, because another share of the scattered light is absorbed
     Estimate cortex_length, medulla_length;                    ///< mean lengths of a path of scattered light [radii]

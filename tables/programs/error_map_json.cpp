@@ -31,6 +31,7 @@ ordered_json json_of(const sim3d::ChannelError& e) {
     for (std::size_t k = 0; k < all_lobe_count; ++k) out["model"][lobe_names[k]] = e.model[k];
     out["model"]["scattered"] = e.model_scattered();
     out["lobe"] = json_of(e.lobe), out["shape"] = json_of(e.shape), out["shape_with_cosine"] = json_of(e.cosine);
+    out["sigma"] = json_of(e.sigma);
     return out;
 }
 
@@ -47,6 +48,7 @@ ordered_json json_of(const sim3d::Causes& c) {
         for (std::size_t v = 0; v < sim3d::longitudinal_count; ++v) shape[variants[v]] = json_of(c.shape[near][v]);
         shape["over_phi"] = json_of(c.over_phi[near]), shape["over_theta_r"] = json_of(c.over_theta[near]);
         shape["product"] = json_of(c.product[near]);
+        shape["sigma"] = json_of(c.sigma[near]), shape["sigma_over_theta_r"] = json_of(c.sigma_over_theta[near]);
         if (near == 0) shape["smooth_cuticle"] = json_of(c.cuticle);
         out[near ? "shape_of_offsets" : "shape_of_far_field"] = shape;
     }

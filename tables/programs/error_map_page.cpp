@@ -100,6 +100,12 @@ std::string shape_row(const std::string& name, const Distance& far, const Distan
                        near ? distance_cell(*near) : std::string("<td class=\"quiet\">–</td>"));
 }
 
+/// What a difference of two squared errors says of the first.
+std::string nearer(const Estimate& difference) {
+    if (std::abs(difference.value) <= 2 * difference.error) return "no difference beyond the noise";
+    return difference.value < 0 ? "nearer to the truth" : "farther from the truth";
+}
+
 std::string causes_of_shape(const sim3d::Causes& c) {
     const auto variant = [&](sim3d::Longitudinal which, const std::string& name, const char* why) {
         const auto k = static_cast<std::size_t>(which);
@@ -113,7 +119,8 @@ std::string causes_of_shape(const sim3d::Causes& c) {
            variant(Longitudinal::house_cosine, "C<sup>M</sup> times cos θ<sub>r</sub>",
                    "a slab counts exits per radian of a plane, a cylinder per solid angle; at σ<sub>ms</sub> κ / cos "
                    "θ<sub>t</sub>") +
-           variant(Longitudinal::authors_cosine, "the same at σ<sub>ms</sub> κ", "") +
+           variant(Longitudinal::authors_cosine, "the same at σ<sub>ms</sub> κ",
+                   ("in the far field " + nearer(c.sigma[0]) + ", at single offsets " + nearer(c.sigma[1])).c_str()) +
            shape_row("over φ alone, with the cosine", c.over_phi[0], &c.over_phi[1],
                      "C<sup>N</sup>: the planar phase function, no refraction or reflection on the way out") +
            shape_row("over θ<sub>r</sub> alone, with the cosine", c.over_theta[0], &c.over_theta[1],

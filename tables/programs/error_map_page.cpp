@@ -106,6 +106,11 @@ std::string nearer(const Estimate& difference) {
     return difference.value < 0 ? "nearer to the truth" : "farther from the truth";
 }
 
+std::string sigma_text(const sim3d::Causes& c) {
+    const std::string far = nearer(c.sigma[0]), offsets = nearer(c.sigma[1]);
+    return far == offsets ? far : "far field: " + far + "; single offsets: " + offsets;
+}
+
 std::string causes_of_shape(const sim3d::Causes& c) {
     const auto variant = [&](sim3d::Longitudinal which, const std::string& name, const char* why) {
         const auto k = static_cast<std::size_t>(which);
@@ -119,8 +124,7 @@ std::string causes_of_shape(const sim3d::Causes& c) {
            variant(Longitudinal::house_cosine, "C<sup>M</sup> times cos θ<sub>r</sub>",
                    "a slab counts exits per radian of a plane, a cylinder per solid angle; at σ<sub>ms</sub> κ / cos "
                    "θ<sub>t</sub>") +
-           variant(Longitudinal::authors_cosine, "the same at σ<sub>ms</sub> κ",
-                   ("in the far field " + nearer(c.sigma[0]) + ", at single offsets " + nearer(c.sigma[1])).c_str()) +
+           variant(Longitudinal::authors_cosine, "the same at σ<sub>ms</sub> κ", sigma_text(c).c_str()) +
            shape_row("over φ alone, with the cosine", c.over_phi[0], &c.over_phi[1],
                      "C<sup>N</sup>: the planar phase function, no refraction or reflection on the way out") +
            shape_row("over θ<sub>r</sub> alone, with the cosine", c.over_theta[0], &c.over_theta[1],

@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "bench/published_model.hpp"
 #include "sim3d/fibre_tracer.hpp"
 #include "sim3d/fibre_walk.hpp"
+#include "sim3d/model/five_lobes.hpp"
 
 using namespace medulla;
 using namespace medulla::sim3d;
@@ -68,7 +68,7 @@ int main(int argc, char** argv) {
         const FurPreset* preset = find_preset(name.c_str());
         if (preset == nullptr) return std::fprintf(stderr, "no animal %s\n", name.c_str()), 2;
         for (const bool rough : {false, true}) {
-            Fibre fibre = bench::fibre_of(*preset);
+            Fibre fibre = fibre_of(parameters_of<3>(*preset), 1);
             if (!rough) fibre.alpha = fibre.beta_m = fibre.beta_n = 0;
             DirectionalDensity reference;
             if (truth > 0) {

@@ -11,31 +11,13 @@
 #include <string>
 #include <vector>
 
-#include "bench/published_model.hpp"
 #include "sim3d/fibre_tracer.hpp"
+#include "sim3d/model/error_map.hpp"
 
 using namespace medulla;
 using namespace medulla::sim3d;
-using bench::Longitudinal;
 
 namespace {
-
-/// The same over phi alone, or theta_r alone, as a density of one row or column.
-DirectionalDensity marginal(const DirectionalDensity& d, bool over_phi) {
-    DirectionalDensity m;
-    m.theta_bins = over_phi ? 1 : d.theta_bins, m.phi_bins = over_phi ? d.phi_bins : 1;
-    m.value.assign(m.theta_bins * m.phi_bins, 0.0);
-    for (std::size_t i = 0; i < d.value.size(); ++i) m.value[over_phi ? i % d.phi_bins : i / d.phi_bins] += d.value[i];
-    return m;
-}
-
-DirectionalDensity product_of_marginals(const DirectionalDensity& d) {
-    const DirectionalDensity phi = marginal(d, true), theta = marginal(d, false);
-    DirectionalDensity p = d;
-    for (std::size_t i = 0; i < p.value.size(); ++i)
-        p.value[i] = theta.value[i / d.phi_bins] * phi.value[i % d.phi_bins];
-    return p;
-}
 
 /// |a - b| / |b| of densities as they are.
 double relative_distance(const DirectionalDensity& a, const DirectionalDensity& b) {
@@ -45,6 +27,36 @@ double relative_distance(const DirectionalDensity& a, const DirectionalDensity& 
     return std::sqrt(d / n);
 }
 
+/// --sigma: at which sigma C^M times cos theta_r is nearer to the truth, sigma_ms kappa / cos theta_t or sigma_ms
+/// kappa: relative L2 errors of the scattered shape over light from all directions, with the noise of their difference.
+nlohmann::json compare_sigma(const FurPreset& preset, std::uint64_t paths, std::uint64_t seed) {
+    ErrorMapOptions options;
+    options.paths = paths, options.seed = seed;
+    const ErrorMap map = error_map(fibre_of(parameters_of<3>(preset), 1), Reflectance::bravais, options);
+    const Causes& causes = map.causes[0];
+    nlohmann::json row = {{"animal", preset.name}};
+    std::printf("%-9s |", preset.name);
+    for (const std::size_t near : {0u, 1u}) {
+        const Distance &house = causes.shape[near][std::size_t(Longitudinal::house_cosine)],
+                       &authors = causes.shape[near][std::size_t(Longitudinal::authors_cosine)];
+        const Estimate &lobe = causes.sigma[near], &over_theta = causes.sigma_over_theta[near];
+        std::printf(" %.4f %.4f %+.2f(%.2f) %+.2f(%.2f) |", house.value(), authors.value(), lobe.value * 1e3,
+                    lobe.error * 1e3, over_theta.value * 1e3, over_theta.error * 1e3);
+        row[near ? "offsets" : "far"] = {{"over_cos", {house.value(), house.error()}},
+                                         {"plain", {authors.value(), authors.error()}},
+                                         {"difference", {lobe.value, lobe.error}},
+                                         {"difference_over_theta_r", {over_theta.value, over_theta.error}}};
+    }
+    for (const LightError& light : map.far) {
+        const Estimate& e = light.channels[0].sigma;
+        row["by_theta_i"].push_back({light.theta_i * 180 / pi, e.value, e.error});
+        std::printf(" %+.1f(%.1f)", e.value * 1e3, e.error * 1e3);
+    }
+    std::printf("\n");
+    std::fflush(stdout);
+    return row;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -52,15 +64,16 @@ int main(int argc, char** argv) {
     options.paths = 4000000, options.theta_bins = 60, options.phi_bins = 96;
     double theta_i = -40;
     std::optional<double> h;
-    bool smooth = false;
+    bool smooth = false, sigma = false;
     std::string json;
     std::vector<std::string> animals;
     CLI::App app("The published model against light in the whole fibre");
     app.add_option("--paths", options.paths, "paths per animal");
     app.add_option("--seed", options.seed);
     app.add_option("--theta-i", theta_i, "inclination of the light [degrees]");
-    app.add_option("--offset", h, "one ray, of this h; without: the far field");
+    app.add_option("--offset", h, "one ray, of this h; without: the far field")->check(CLI::Range(0.0, 1.0));
     app.add_flag("--smooth", smooth, "leave out the cuticle's tilt and roughness");
+    app.add_flag("--sigma", sigma, "instead: which sigma C^M wants, over light from all directions; --paths per cell");
     app.add_option("--animal", animals, "these alone");
     app.add_option("--theta-bins", options.theta_bins);
     app.add_option("--phi-bins", options.phi_bins);
@@ -71,6 +84,19 @@ int main(int argc, char** argv) {
     light.theta_i = theta_i * pi / 180;
     if (h) light.h_low = light.h_high = *h;
     nlohmann::json out;
+    const auto wanted = [&](const FurPreset& preset) {
+        return animals.empty() || std::find(animals.begin(), animals.end(), preset.name) != animals.end();
+    };
+    if (sigma) {
+        std::printf(
+            "C^M times cos theta_r, relative L2 of the scattered shape: at sigma_ms kappa / cos theta_t, at sigma_ms "
+            "kappa, 1000 times the second's square minus the first's (standard error), the same over theta_r alone | "
+            "single offsets | 1000 times the difference in the far field by theta_i, -75 to 75 degrees\n");
+        for (const FurPreset& preset : fur_presets)
+            if (wanted(preset)) out["animals"].push_back(compare_sigma(preset, options.paths, options.seed));
+        if (!json.empty()) std::ofstream(json) << out.dump(1) << '\n';
+        return 0;
+    }
     std::printf("theta_i = %g degrees, %s, %s cuticle, %.3g paths an animal, bins of %.3g x %.3g degrees\n", theta_i,
                 h ? "one ray" : "far field", smooth ? "smooth" : "rough", double(options.paths),
                 180.0 / double(options.theta_bins), 360.0 / double(options.phi_bins));
@@ -82,19 +108,24 @@ int main(int argc, char** argv) {
         "at the authors' sigma | with the cosine: over phi, over theta_r | of the product of its own marginals | "
         "noise | relative L2 of the scattered lobe: published, its shape, with the cosine\n");
     for (const FurPreset& preset : fur_presets) {
-        if (!animals.empty() && std::find(animals.begin(), animals.end(), preset.name) == animals.end()) continue;
-        Fibre fibre = bench::fibre_of(preset);
+        if (!wanted(preset)) continue;
+        Fibre fibre = fibre_of(parameters_of<3>(preset), 1);
         if (smooth) fibre.alpha = fibre.beta_m = fibre.beta_n = 0;
         const FibreProfile truth = trace_fibre(fibre, light, options);
-        const bench::PublishedModel model =
-            bench::published_model(fibre, light.theta_i, h, options.theta_bins, options.phi_bins);
+        const OffsetRange range = h ? OffsetRange{*h, *h} : OffsetRange{0, 1};
+        const FiveLobes model =
+            five_lobes(fibre, Reflectance::bravais, light.theta_i, {range}, options.theta_bins, options.phi_bins)[0];
+        const double model_energy = model.energy[0][3] + model.energy[0][4];
+        const auto shape = [&](Longitudinal which) {
+            const DirectionalDensity& d = model.scattered[0][std::size_t(which)];
+            return h ? d : folded(d);
+        };
         Fibre white = fibre;
         white.sigma_ca = {0}, white.sigma_ma = 0;
         FibreOptions fewer = options;
         fewer.paths = options.paths / 4 + 1;
         const Estimate white_truth = trace_fibre(white, light, fewer).energy(scattered);
-        const bench::PublishedModel white_model = bench::published_model(white, light.theta_i, h, 1, 1);
-        const double white_energy = white_model.energy[3] + white_model.energy[4];
+        const double white_energy = model.white[3] + model.white[4];
 
         nlohmann::json row = {
             {"animal", preset.name}, {"white_scattered", white_truth.value}, {"white_model", white_energy}};
@@ -111,22 +142,24 @@ int main(int argc, char** argv) {
             row["truth"].push_back({e.value, e.error});
         }
         std::printf(" |");
-        for (const double A : model.energy) std::printf(" %.3f", A), row["model"].push_back(A);
+        for (int k = 0; k < lobe_count; ++k)
+            std::printf(" %.3f", model.energy[0][std::size_t(k)]),
+                row["model"].push_back(model.energy[0][std::size_t(k)]);
         std::printf(" | %.3f(%.0f) %.3f\n", white_truth.value, std::ceil(white_truth.error * 1e3), white_energy);
 
         out["animals"].push_back(row);
-        if (!(model.energy[3] > 0)) continue;  // one ray that misses the medulla
+        if (!(model_energy > 0)) continue;  // one ray that misses the medulla
         const DirectionalDensity lobe = truth.density(scattered, 0, !h);
-        const DirectionalDensity& published = model.scattered[int(Longitudinal::house)];
-        const DirectionalDensity& cosine = model.scattered[int(Longitudinal::house_cosine)];
+        const DirectionalDensity published = shape(Longitudinal::house);
+        const DirectionalDensity cosine = shape(Longitudinal::house_cosine);
         DirectionalDensity scaled[2] = {published, cosine};
-        const double all = truth.energy(scattered).value / (model.energy[3] + model.energy[4]);
+        const double all = truth.energy(scattered).value / model_energy;
         for (DirectionalDensity& d : scaled)
             for (double& v : d.value) v *= all;
         const std::vector<double> numbers = {total_variation(lobe, published),
-                                             total_variation(lobe, model.scattered[int(Longitudinal::authors)]),
+                                             total_variation(lobe, shape(Longitudinal::authors)),
                                              total_variation(lobe, cosine),
-                                             total_variation(lobe, model.scattered[int(Longitudinal::authors_cosine)]),
+                                             total_variation(lobe, shape(Longitudinal::authors_cosine)),
                                              total_variation(marginal(lobe, true), marginal(cosine, true)),
                                              total_variation(marginal(lobe, false), marginal(cosine, false)),
                                              total_variation(lobe, product_of_marginals(lobe)),

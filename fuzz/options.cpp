@@ -43,6 +43,7 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
             static Precompute program;
             program.args = Arguments();
             program.app.parse(arguments);
+            if (is_error_map(program.app)) return 0;
             const Job job = job_of(program.args);
             if (job.share && (job.share->index < 1 || job.share->index > job.share->count)) std::abort();
             check_request(job.request);

@@ -13,6 +13,7 @@ ROOMS = {
     "sim2d/reference": {"sim2d", "sim2d/slab"},
     "sim2d/tracer": {"sim2d", "sim2d/disc", "sim2d/slab"},
     "sim3d": {"runtime/include/medulla", "sim2d", "sim2d/tracer"},
+    "sim3d/model": {"sim3d", "sim2d/disc", "sim2d/slab"},
     "tensor": set(),
     "plot": set(),
     "tables": set(),
@@ -20,7 +21,7 @@ ROOMS = {
     "tables/store": {"tables/table"},
     "tables/job": {"tables/store", "sim2d/tracer", "sim2d/reference"},
     "tables/pack": {"tables/store", "tensor"},
-    "tables/programs": {"tables/job", "tables/pack", "plot"},
+    "tables/programs": {"tables/job", "tables/pack", "plot", "sim3d/model"},
 }
 
 

@@ -1,6 +1,8 @@
-// medulla-precompute: simulates the tables and writes them to an HDF5 file.
+// medulla-precompute: simulates the tables and writes them to an HDF5 file; or, for one material, compares the model
+// with light in the whole fibre (--error-map).
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "sim2d/disc/deterministic.hpp"
@@ -9,6 +11,7 @@
 #include "tables/job/precompute.hpp"
 #include "tables/job/scene.hpp"
 #include "tables/job/simulate.hpp"
+#include "tables/programs/error_map.hpp"
 #include "tables/programs/number.hpp"
 #include "tables/programs/program.hpp"
 #include "tables/store/json_text.hpp"
@@ -19,7 +22,7 @@ using namespace medulla::tables;
 
 struct Arguments {
     std::string output = "tables.h5", table = "both", sigma, g, h, theta, absorption, method = "auto",
-                progress = "auto", compression = "zstd", shard = "auto", scene;
+                progress = "auto", compression = "zstd", shard = "auto", scene, fibre, error_map;
     std::size_t bins = 720;
     std::uint64_t paths = 100000, seed = 1;
     std::optional<double> target_error, time_budget;
@@ -169,7 +172,27 @@ void print_share(const Job& job, const JobReport& report, double seconds, bool a
           job.output);
 }
 
-void run(const Arguments& args) {
+/// Whether --error-map replaces the job. Throws UsageError for options of the job beside it.
+bool is_error_map(const CLI::App& app) {
+    const bool fibre = app.count("--fibre") > 0, page = app.count("--error-map") > 0;
+    if (!fibre && !page) return false;
+    if (!page) throw UsageError("--fibre: expected --error-map OUT.html with it, found none");
+    if (!fibre) throw UsageError("--error-map: expected --fibre MATERIAL with it, found none");
+    constexpr const char* common[] = {"--fibre",   "--error-map", "--paths", "--seed",
+                                      "--threads", "--progress",  "--json"};
+    for (const CLI::Option* option : app.get_options()) {
+        const std::string name = option->get_name();
+        const auto* end = std::end(common);
+        if (option->count() > 0 && std::find(std::begin(common), end, name) == end)
+            throw UsageError("{}: expected no option of the tables with --error-map, found this one", name);
+    }
+    return true;
+}
+
+void run(const CLI::App& app, const Arguments& args) {
+    if (is_error_map(app))
+        return run_error_map(
+            {args.fibre, args.error_map, args.paths, args.seed, args.threads, progress_of(args.progress), args.json});
     Job job = job_of(args);
     double share = 1;
     if (!args.scene.empty()) {
@@ -234,6 +257,13 @@ void declare(CLI::App& app, Arguments& args) {
                    "optical radii of absorption LO:HI[:N], nodes denser towards LO: a fifth axis of C^N, from the same "
                    "paths (default: none; N 8)");
     app.add_option("--scene", args.scene, "scene file (JSON): only the nodes that its materials need");
+    app.add_option("--fibre", args.fibre,
+                   "with --error-map: a material file (JSON), or a preset of `furtable presets`");
+    app.add_option(
+        "--error-map", args.error_map,
+        "in place of tables: write a page (HTML) of where the five-lobe model of --fibre differs from light in "
+        "the fibre in three dimensions, and by how much; --paths are traced for each of 88 cells (theta_i, h), and as "
+        "many again in a smooth fibre");
     app.add_flag("--dry-run", args.dry_run, "print what would be simulated and how long it would take; write nothing");
     add_number(app, "--bins", args.bins, "exit directions over the full circle, even", {8, 4096})
         ->capture_default_str();
@@ -291,5 +321,5 @@ int main(int argc, char** argv) {
     CLI::App app("Simulates the scattering of a fur fibre's medulla into tables (HDF5).", "medulla-precompute");
     Arguments args;
     declare(app, args);
-    return run_program(app, argc, argv, [&] { run(args); });
+    return run_program(app, argc, argv, [&] { run(app, args); });
 }

@@ -93,6 +93,7 @@ void run(const Options& o, const CLI::App& app) {
     if (!o.tone.empty()) scene.picture.filmic = o.tone == "filmic";
     for (Object& object : scene.objects)
         for (Layer& layer : object.coat) layer.density *= float(o.density);
+    for (Strands& strands : scene.strands) thin(strands, o.density);
 
     RenderOptions options = o.render;
     options.path.field = o.field == "near"  ? FieldChoice::one_offset

@@ -100,19 +100,6 @@ std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::
     return points;
 }
 
-namespace {
-
-/// Appends a strand through `line`: one more point at either end so that the spline reaches both.
-void append(const std::vector<Vec3>& line, const std::vector<float>& radius, std::vector<CurvePoint>& points) {
-    const auto put = [&](Vec3 p, float r) { points.push_back({p.x, p.y, p.z, r}); };
-    const std::size_t last = line.size() - 1;
-    put(2 * line[0] - line[1], 2 * radius[0] - radius[1]);
-    for (std::size_t k = 0; k <= last; ++k) put(line[k], radius[k]);
-    put(2 * line[last] - line[last - 1], std::max(0.0f, 2 * radius[last] - radius[last - 1]));
-}
-
-}  // namespace
-
 Strands grow(const Shape& shape, const Layer& layer) {
     const double wanted = double(layer.density) * double(area_of(shape));
     const std::size_t count = std::max<std::size_t>(1, std::size_t(wanted + 0.5));
@@ -133,7 +120,7 @@ Strands grow(const Shape& shape, const Layer& layer) {
     }
 
     Strands strands;
-    strands.segments = layer.segments, strands.along = layer.along;
+    strands.along = layer.along;
     strands.colour_noise = layer.colour_noise, strands.seed = layer.seed;
     strands.points.reserve(roots.size() * std::size_t(layer.segments + 3));
     std::vector<float> radius(std::size_t(layer.segments) + 1);
@@ -170,18 +157,18 @@ Strands grow(const Shape& shape, const Layer& layer) {
             }
             line = curled;
         }
-        append(line, radius, strands.points);
+        append_along(line, radius, strands);
     }
     return strands;
 }
 
 Strands strand_of(const SingleFibre& fibre) {
     Strands strands;
-    strands.segments = int(fibre.points.size()) - 1, strands.along = fibre.along;
+    strands.along = fibre.along;
     std::vector<float> radius;
     for (std::size_t k = 0; k < fibre.points.size(); ++k)
-        radius.push_back(fibre.radius * mix(1.0f, fibre.tip, float(k) / float(strands.segments)));
-    append(fibre.points, radius, strands.points);
+        radius.push_back(fibre.radius * mix(1.0f, fibre.tip, float(k) / float(fibre.points.size() - 1)));
+    append_through(fibre.points, radius, strands);
     return strands;
 }
 

@@ -1,18 +1,15 @@
 #include "render/scene.hpp"
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-
 #include "render/error.hpp"
 #include "render/fields.hpp"
+#include "render/strand_file.hpp"
 
 namespace medulla::render {
 namespace {
 
 using nlohmann::json;
 
-constexpr double greatest_file = 1 << 24;
+constexpr std::uint64_t greatest_scene = 1 << 24;
 
 Camera read_camera(Fields f) {
     Camera c;
@@ -150,6 +147,45 @@ Object read_object(Fields f, const std::vector<Material>& materials, const json&
     return o;
 }
 
+/// The bytes of the file that a field names, beside the scene; its fingerprint goes into scene.text.
+std::string named_file(Fields& f, const char* name, std::uint64_t most, Scene& scene, std::string& path) {
+    path = path_beside(f.file(), f.text(name, ""));
+    std::string bytes;
+    try {
+        bytes = read_file(path, most);
+    } catch (const Error& error) {
+        throw Error("{}: {}", f.place(name), error.what());
+    }
+    scene.text += fmt::format("\n{:016x}", fingerprint(bytes.data(), bytes.size()));
+    return bytes;
+}
+
+Placement read_placement(Fields& f) {
+    Placement p;
+    p.scale = f.number("scale", p.scale, positive);
+    p.up = f.choice("up", {"x", "y", "z"}, p.up);
+    p.turn = f.degrees("turn", 0, -360, 360);
+    p.translate = f.vector("translate", p.translate);
+    return p;
+}
+
+Strands read_strand_object(Fields f, Scene& scene) {
+    StrandFile how;
+    how.placement = read_placement(f);
+    if (f.has("radius")) how.radius = f.number("radius", 0, positive);
+    how.radius_scale = f.number("radius_scale", 1, positive);
+    const std::vector<Stop> along = read_along(f, scene.materials);
+    const float colour_noise = f.number("colour_noise", 0, {0, 10});
+    const auto seed = std::uint32_t(f.whole("seed", 1, 0, 2000000000));
+    f.has("strands");
+    f.done();
+    std::string path;
+    const std::string bytes = named_file(f, "strands", greatest_strand_file, scene, path);
+    Strands strands = read_strands(path, bytes, how);
+    strands.along = along, strands.colour_noise = colour_noise, strands.seed = seed;
+    return strands;
+}
+
 SingleFibre read_fibre(Fields f, const std::vector<Material>& materials) {
     SingleFibre s;
     s.along = read_along(f, materials);
@@ -223,28 +259,22 @@ Scene parse_scene(const std::string& text, const std::string& where) {
     each("materials", [&](Fields m) { scene.materials.push_back(read_material(std::move(m))); });
     const json& coats = f.has("coats") ? f.value("coats") : nothing;
     if (!coats.is_object()) throw Error("{}: expected an object, found {}", f.place("coats"), quoted(coats));
-    each("objects", [&](Fields o) { scene.objects.push_back(read_object(std::move(o), scene.materials, coats)); });
+    each("objects", [&](Fields o) {
+        if (o.has("strands"))
+            scene.strands.push_back(read_strand_object(std::move(o), scene));
+        else
+            scene.objects.push_back(read_object(std::move(o), scene.materials, coats));
+    });
     each("fibres", [&](Fields s) { scene.fibres.push_back(read_fibre(std::move(s), scene.materials)); });
     each("lights", [&](Fields l) { scene.lights.push_back(read_light(std::move(l))); });
     if (f.has("ground")) scene.ground = read_ground(part("ground"));
     f.done();
     if (scene.lights.empty()) throw Error("{}: expected at least one light, found none", f.place("lights"));
-    if (scene.objects.empty() && scene.fibres.empty())
+    if (scene.objects.empty() && scene.strands.empty() && scene.fibres.empty())
         throw Error("{}: expected at least one object or one of fibres, found none", f.place("objects"));
     return scene;
 }
 
-Scene read_scene(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw Error("{}: cannot be read: {}", path, std::strerror(errno));
-    std::string text;
-    char block[4096];
-    while (file.read(block, sizeof block), file.gcount() > 0) {
-        text.append(block, std::size_t(file.gcount()));
-        if (double(text.size()) > greatest_file) throw Error("{}: expected at most 16 MiB", path);
-    }
-    if (file.bad()) throw Error("{}: cannot be read: {}", path, std::strerror(errno));
-    return parse_scene(text, path);
-}
+Scene read_scene(const std::string& path) { return parse_scene(read_file(path, greatest_scene), path); }
 
 }  // namespace medulla::render

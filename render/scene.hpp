@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "medulla/fur_parameters.hpp"
-#include "render/vector.hpp"
+#include "render/strands.hpp"
 
 namespace medulla::render {
 
@@ -27,12 +27,6 @@ struct Picture {
 struct Material {
     std::string name;
     FurParameters<3> fur;
-};
-
-/// The material at a place along the strand; between two of them every parameter is interpolated.
-struct Stop {
-    float at;  ///< 0 root, 1 tip
-    int material;
 };
 
 struct Layer {
@@ -100,10 +94,11 @@ struct Scene {
     Picture picture;
     std::vector<Material> materials;
     std::vector<Object> objects;
+    std::vector<Strands> strands;  ///< from files
     std::vector<SingleFibre> fibres;
     Ground ground;
     std::vector<Light> lights;
-    std::string text;  ///< the file, to tell whether a picture that goes on is of the same scene
+    std::string text;  ///< the file and fingerprints of those it names, to tell whether a picture that goes on is of it
 };
 
 /// Throws Error: one line with file, field, expected and found.

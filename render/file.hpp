@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <cstring>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "render/vector.hpp"
 
@@ -17,6 +19,14 @@ std::string path_beside(const std::string& beside, const std::string& name);
 
 /// FNV-1a.
 std::uint64_t fingerprint(const void* bytes, std::size_t count);
+
+/// The words between white space.
+void split(std::string_view text, std::vector<std::string_view>& words);
+/// All of `word` as a finite number; false where it is none. The same in every locale.
+bool read_number(std::string_view word, double& x);
+bool read_whole(std::string_view word, std::int64_t& x);
+/// As it may stand in a message: its first 40 characters, in ASCII.
+std::string printable(std::string_view text);
 
 /// A number of a file at these bytes, in the byte order of the file.
 template <class T>

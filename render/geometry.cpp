@@ -55,7 +55,10 @@ Geometry::Geometry(const Scene& scene) {
     scene_ = rtcNewScene(device_);
     rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
     for (const Object& object : scene.objects)
-        for (const Layer& layer : object.coat) strands_.push_back(grow(object.shape, layer));
+        for (const Layer& layer : object.coat) {
+            strands_.push_back(grow(object.shape, layer));
+            if (strands_.back().count() == 0) throw Error("coat: expected a surface that grows hair, found none");
+        }
     strands_.insert(strands_.end(), scene.strands.begin(), scene.strands.end());
     for (const SingleFibre& fibre : scene.fibres) strands_.push_back(strand_of(fibre));
     for (const Object& object : scene.objects)
@@ -156,9 +159,9 @@ StrandHit Geometry::strand_hit(const Hit& hit) const {
 SkinHit Geometry::skin_hit(const Hit& hit) const {
     const Mesh& m = meshes_[hit.geometry - strands_.size()];
     const std::uint32_t *i = m.indices.data() + 3 * std::size_t(hit.primitive), a = i[0], b = i[1], c = i[2];
-    const float u = hit.u, v = hit.v, w = 1 - u - v;
-    return {w * m.positions[a] + u * m.positions[b] + v * m.positions[c],
-            normalise(w * m.normals[a] + u * m.normals[b] + v * m.normals[c]),
+    const SurfacePoint p = m.at(hit.primitive, hit.u, hit.v);
+    return {p.position,
+            p.normal,
             normalise(cross(m.positions[b] - m.positions[a], m.positions[c] - m.positions[a])),
             m.albedo,
             {hit.geometry, hit.primitive, 0, 0}};

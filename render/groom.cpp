@@ -86,7 +86,8 @@ std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::
     Sequence random(seed);
     PointGrid grid(distance);
     std::vector<SurfacePoint> points;
-    for (std::size_t tries = 0; points.size() < count && tries < 30 * count; ++tries) {
+    std::size_t placed = 0;
+    for (std::size_t tries = 0; placed < count && tries < 30 * count; ++tries) {
         const SurfacePoint p = sample_surface(shape, random);
         bool free = true;
         grid.around(p.position, [&](Vec3 q, std::uint32_t) {
@@ -94,8 +95,8 @@ std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::
             free = free && dot(d, d) >= distance * distance;
         });
         if (!free) continue;
-        grid.add(p.position, std::uint32_t(points.size()));
-        points.push_back(p);
+        grid.add(p.position, std::uint32_t(placed++));
+        if (p.fur > 0) points.push_back(p);  // a bald place takes its share of the strands
     }
     return points;
 }
@@ -115,7 +116,7 @@ Strands grow(const Shape& shape, const Layer& layer) {
             guide_grid.add(centre.position, std::uint32_t(guides.size()));
             Sequence random(hash(layer.seed ^ 0x7f4a7c15u, std::uint32_t(guides.size())));
             const float a = random.even(), b = random.even();
-            guides.push_back(combed(centre, layer, layer.length, a, b));
+            guides.push_back(combed(centre, layer, centre.fur * layer.length, a, b));
         }
     }
 
@@ -130,7 +131,7 @@ Strands grow(const Shape& shape, const Layer& layer) {
     }
     for (std::size_t i = 0; i < roots.size(); ++i) {
         Sequence random(hash(layer.seed, std::uint32_t(i)));
-        const float length = layer.length * (1 + layer.length_noise * random.even());
+        const float length = roots[i].fur * layer.length * (1 + layer.length_noise * random.even());
         const float a = random.even(), b = random.even(), phase = 2 * pi_f * random();
         std::vector<Vec3> line = combed(roots[i], layer, length, a, b);
         if (!guides.empty()) {

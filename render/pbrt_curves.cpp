@@ -1,9 +1,7 @@
 // The curves of a pbrt scene (versions 3 and 4): https://pbrt.org/fileformat-v4. Everything but curves and the
 // transforms that place them is skipped, or refused where skipping it would put curves in the wrong place.
 #include <array>
-#include <charconv>
 #include <set>
-#include <string_view>
 
 #include "render/error.hpp"
 #include "render/strand_file.hpp"
@@ -31,10 +29,8 @@ class Lexer {
         return taken;
     }
     [[noreturn]] void fail(std::size_t line, const std::string& expected, std::string_view found) const {
-        std::string shown(found.substr(0, 40));
-        for (char& c : shown)
-            if (c < ' ' || c > '~') c = '?';
-        throw Error("{}:{}: expected {}, found {}", path_, line, expected, shown.empty() ? "the end" : shown);
+        throw Error("{}:{}: expected {}, found {}", path_, line, expected,
+                    found.empty() ? "the end" : printable(found));
     }
     double number(const char* what) {
         if (token_.kind != Kind::number) fail(token_.line, what, token_.text);
@@ -69,12 +65,7 @@ class Lexer {
             const std::string_view word = rest_.substr(0, size);
             const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
             token_.kind = letter ? Kind::word : Kind::number;
-            if (!letter) {
-                const std::string_view digits = word[0] == '+' ? word.substr(1) : word;
-                const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), token_.number);
-                if (error != std::errc() || end != digits.data() + digits.size() || !std::isfinite(token_.number))
-                    fail(line_, "a number", word);
-            }
+            if (!letter && !read_number(word, token_.number)) fail(line_, "a number", word);
         }
         token_.text = rest_.substr(0, size);
         rest_.remove_prefix(size);

@@ -1,5 +1,6 @@
 #include "render/scene.hpp"
 
+#include "render/creature.hpp"
 #include "render/error.hpp"
 #include "render/fields.hpp"
 #include "render/strand_file.hpp"
@@ -118,35 +119,6 @@ Layer read_layer(Fields f, const std::vector<Material>& materials, int material)
     return l;
 }
 
-/// @param coats named lists of layers, which an object may share with others
-Object read_object(Fields f, const std::vector<Material>& materials, const json& coats) {
-    Object o;
-    Shape& s = o.shape;
-    s.form = static_cast<Form>(f.choice("shape", {"patch", "sphere", "torus"}, 1));
-    s.centre = f.vector("centre", s.centre);
-    if (s.form == Form::patch) {
-        s.width = f.number("width", 1, positive), s.depth = f.number("depth", 1, positive);
-    } else {
-        s.radius = f.number("radius", 1, positive);
-        if (s.form == Form::torus) s.tube = f.number("tube", 0.4f * s.radius, {0, s.radius, true});
-    }
-    if (f.has("skin") && f.value("skin").is_null())
-        o.has_skin = false;
-    else
-        o.skin = f.colour("skin", o.skin, share);
-    const int material = f.has("material") ? material_named(materials, f.value("material"), f.place("material")) : -1;
-    const bool named = f.has("coat") && f.value("coat").is_string();
-    if (named && !coats.contains(f.text("coat", "")))
-        throw Error("{}: expected layers or one of /coats, found {}", f.place("coat"), quoted(f.value("coat")));
-    const json& coat = named ? coats[f.text("coat", "")] : f.list("coat");
-    const std::string pointer = named ? "/coats/" + f.text("coat", "") : f.pointer("coat");
-    if (!coat.is_array()) throw Error("{}: {}: expected a list, found {}", f.file(), pointer, quoted(coat));
-    for (std::size_t i = 0; i < coat.size(); ++i)
-        o.coat.push_back(read_layer({coat[i], f.file(), fmt::format("{}/{}", pointer, i)}, materials, material));
-    f.done();
-    return o;
-}
-
 /// The bytes of the file that a field names, beside the scene; its fingerprint goes into scene.text.
 std::string named_file(Fields& f, const char* name, std::uint64_t most, Scene& scene, std::string& path) {
     path = path_beside(f.file(), f.text(name, ""));
@@ -167,6 +139,71 @@ Placement read_placement(Fields& f) {
     p.turn = f.degrees("turn", 0, -360, 360);
     p.translate = f.vector("translate", p.translate);
     return p;
+}
+
+std::shared_ptr<const Mesh> read_mesh_object(Fields& f, Scene& scene) {
+    MeshFile how;
+    how.placement = read_placement(f);
+    how.clockwise = f.choice("faces", {"counter-clockwise", "clockwise"}, 0) == 1;
+    std::string path;
+    const std::string bytes = named_file(f, "file", greatest_mesh_file, scene, path);
+    return std::make_shared<const Mesh>(read_mesh(path, bytes, how));
+}
+
+std::shared_ptr<const Mesh> read_creature(Fields& f) {
+    const Placement placement = read_placement(f);
+    const float blend = f.number("blend", 0.03f, {0.001, 1e9});
+    std::vector<Ball> balls;
+    const json& list = f.list("balls");
+    if (list.size() > 1000) throw Error("{}: expected at most 1000 balls, found {}", f.place("balls"), list.size());
+    for (std::size_t i = 0; i < list.size(); ++i) {
+        const std::string place = fmt::format("{}/{}", f.place("balls"), i);
+        if (!list[i].is_array() || list[i].size() < 4 || list[i].size() > 5)
+            throw Error("{}: expected x, y, z, radius and at will the hairs' length, found {}", place, quoted(list[i]));
+        const auto number = [&](std::size_t k, Range range) {
+            return float(checked_number(list[i][k], fmt::format("{}/{}", place, k), range));
+        };
+        const Vec3 centre{number(0, any_number), number(1, any_number), number(2, any_number)};
+        balls.push_back({centre, number(3, positive), list[i].size() == 5 ? number(4, at_least_0) : 1});
+    }
+    if (f.has("balls") && balls.empty()) throw Error("{}: expected at least one ball", f.place("balls"));
+    auto mesh = std::make_shared<const Mesh>(creature(balls.empty() ? fox() : balls, blend, placement));
+    if (mesh->indices.empty()) throw Error("{}: expected balls that the grid about them can resolve", f.place("balls"));
+    return mesh;
+}
+
+/// @param coats named lists of layers, which an object may share with others
+Object read_object(Fields f, Scene& scene, const json& coats) {
+    const std::vector<Material>& materials = scene.materials;
+    Object o;
+    Shape& s = o.shape;
+    s.form = static_cast<Form>(f.choice("shape", {"patch", "sphere", "torus", "mesh", "creature"}, 1));
+    if (s.form == Form::mesh) {
+        s.mesh = read_mesh_object(f, scene);
+    } else if (s.form == Form::creature) {
+        s.mesh = read_creature(f);
+    } else if (s.form == Form::patch) {
+        s.width = f.number("width", 1, positive), s.depth = f.number("depth", 1, positive);
+    } else {
+        s.radius = f.number("radius", 1, positive);
+        if (s.form == Form::torus) s.tube = f.number("tube", 0.4f * s.radius, {0, s.radius, true});
+    }
+    if (s.mesh == nullptr) s.centre = f.vector("centre", s.centre);
+    if (f.has("skin") && f.value("skin").is_null())
+        o.has_skin = false;
+    else
+        o.skin = f.colour("skin", o.skin, share);
+    const int material = f.has("material") ? material_named(materials, f.value("material"), f.place("material")) : -1;
+    const bool named = f.has("coat") && f.value("coat").is_string();
+    if (named && !coats.contains(f.text("coat", "")))
+        throw Error("{}: expected layers or one of /coats, found {}", f.place("coat"), quoted(f.value("coat")));
+    const json& coat = named ? coats[f.text("coat", "")] : f.list("coat");
+    const std::string pointer = named ? "/coats/" + f.text("coat", "") : f.pointer("coat");
+    if (!coat.is_array()) throw Error("{}: {}: expected a list, found {}", f.file(), pointer, quoted(coat));
+    for (std::size_t i = 0; i < coat.size(); ++i)
+        o.coat.push_back(read_layer({coat[i], f.file(), fmt::format("{}/{}", pointer, i)}, materials, material));
+    f.done();
+    return o;
 }
 
 Strands read_strand_object(Fields f, Scene& scene) {
@@ -263,7 +300,7 @@ Scene parse_scene(const std::string& text, const std::string& where) {
         if (o.has("strands"))
             scene.strands.push_back(read_strand_object(std::move(o), scene));
         else
-            scene.objects.push_back(read_object(std::move(o), scene.materials, coats));
+            scene.objects.push_back(read_object(std::move(o), scene, coats));
     });
     each("fibres", [&](Fields s) { scene.fibres.push_back(read_fibre(std::move(s), scene.materials)); });
     each("lights", [&](Fields l) { scene.lights.push_back(read_light(std::move(l))); });

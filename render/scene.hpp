@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "medulla/fur_parameters.hpp"
+#include "render/mesh.hpp"
 #include "render/strands.hpp"
 
 namespace medulla::render {
@@ -47,13 +49,14 @@ struct Layer {
     std::uint32_t seed = 1;
 };
 
-enum class Form { patch, sphere, torus };
+enum class Form { patch, sphere, torus, mesh, creature };
 
 struct Shape {
     Form form = Form::sphere;
     Vec3 centre;
-    float radius = 1, tube = 0.4f;  ///< sphere and torus (about y); the torus' tube
-    float width = 1, depth = 1;     ///< patch, in the plane y = 0, seen from above
+    float radius = 1, tube = 0.4f;     ///< sphere and torus (about y); the torus' tube
+    float width = 1, depth = 1;        ///< patch, in the plane y = 0, seen from above
+    std::shared_ptr<const Mesh> mesh;  ///< of mesh and creature, where it stands
 };
 
 struct Object {

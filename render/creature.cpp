@@ -5,7 +5,7 @@
 namespace medulla::render {
 namespace {
 
-constexpr double most_cells = 1 << 22;
+constexpr double most_cells = 1 << 20;
 constexpr float cells_per_radius = 6;  // of the smallest ball
 
 struct Grid {
@@ -46,7 +46,7 @@ Grid grid_about(const std::vector<Ball>& balls, float blend) {
 /// f at every node; far from the surface a value of the same sign.
 std::vector<float> values(const Blend& field, const Grid& grid) {
     std::vector<float> f(std::size_t(grid.count[0]) * grid.count[1] * grid.count[2]);
-    constexpr std::uint32_t block = 8;
+    constexpr std::uint32_t block = 4;
     // f changes by no more than the distance: its gradient is a mean of unit vectors.
     const float reach = 0.5f * std::sqrt(3.0f) * float(block) * grid.cell;
     for (std::uint32_t k0 = 0; k0 < grid.count[2]; k0 += block)
@@ -108,15 +108,16 @@ Mesh creature(const std::vector<Ball>& balls, float blend, const Placement& plac
         // that Newton's method takes back along the normal.
         const Vec3 from = grid.position(a), to = grid.position(b);
         float low = 0, high = 1;
-        for (int step = 0; step < 20; ++step) {
+        for (int step = 0; step < 8; ++step) {
             const float middle = 0.5f * (low + high);
             ((field.at(mix(from, to, middle)).f < 0) == (f[a] < 0) ? low : high) = middle;
         }
         Vec3 p = mix(from, to, std::clamp(low, 0.1f, 0.9f));
-        for (int step = 0; step < 6; ++step) {
+        for (int step = 0; step < 16; ++step) {
             const Blend::Value v = field.at(p);
+            if (std::abs(v.f) < 1e-6f) break;
             const float slope = std::max(0.1f, dot(v.gradient, v.gradient));
-            p += std::clamp(-v.f / slope, -0.1f * grid.cell, 0.1f * grid.cell) * v.gradient;
+            p += std::clamp(-v.f / slope, -0.2f * grid.cell, 0.2f * grid.cell) * v.gradient;
         }
         const Blend::Value v = field.at(p);
         positions.push_back(p);

@@ -152,7 +152,7 @@ std::shared_ptr<const Mesh> read_mesh_object(Fields& f, Scene& scene) {
 
 std::shared_ptr<const Mesh> read_creature(Fields& f) {
     const Placement placement = read_placement(f);
-    const float blend = f.number("blend", 0.03f, {0.001, 1e9});
+    const float blend = f.number("blend", 0.015f, {0.001, 1e9});
     std::vector<Ball> balls;
     const json& list = f.list("balls");
     if (list.size() > 1000) throw Error("{}: expected at most 1000 balls, found {}", f.place("balls"), list.size());

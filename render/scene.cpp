@@ -255,9 +255,22 @@ Vec3 direction(Fields& f, const char* name, Vec3 otherwise) {
     return normalise(v);
 }
 
-Light read_light(Fields f) {
+std::shared_ptr<const Environment> read_environment(Fields& f, Scene& scene) {
+    const float turn = f.degrees("turn", 0, -360, 360);
+    const Rgb scale = f.colour("scale", {1, 1, 1});
+    std::string path;
+    const std::string bytes = named_file(f, "file", greatest_image_file, scene, path);
+    return std::make_shared<const Environment>(read_image(path, bytes), turn, scale, path);
+}
+
+Light read_light(Fields f, Scene& scene) {
     Light l;
-    l.form = static_cast<LightForm>(f.choice("light", {"sky", "sun", "rectangle"}, 0));
+    l.form = static_cast<LightForm>(f.choice("light", {"sky", "sun", "rectangle", "environment"}, 0));
+    if (l.form == LightForm::environment) {
+        l.environment = read_environment(f, scene);
+        f.done();
+        return l;
+    }
     l.radiance = f.colour(l.form == LightForm::sun ? "irradiance" : "radiance", l.radiance);
     if (l.form == LightForm::sun) {
         l.direction = direction(f, "direction", l.direction);
@@ -303,7 +316,7 @@ Scene parse_scene(const std::string& text, const std::string& where) {
             scene.objects.push_back(read_object(std::move(o), scene, coats));
     });
     each("fibres", [&](Fields s) { scene.fibres.push_back(read_fibre(std::move(s), scene.materials)); });
-    each("lights", [&](Fields l) { scene.lights.push_back(read_light(std::move(l))); });
+    each("lights", [&](Fields l) { scene.lights.push_back(read_light(std::move(l), scene)); });
     if (f.has("ground")) scene.ground = read_ground(part("ground"));
     f.done();
     if (scene.lights.empty()) throw Error("{}: expected at least one light, found none", f.place("lights"));

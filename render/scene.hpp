@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "medulla/fur_parameters.hpp"
+#include "render/environment.hpp"
 #include "render/mesh.hpp"
 #include "render/strands.hpp"
 
@@ -82,7 +83,7 @@ struct Ground {
     Rgb colour{0.4f, 0.4f, 0.4f};
 };
 
-enum class LightForm { sky, sun, rectangle };
+enum class LightForm { sky, sun, rectangle, environment };
 
 struct Light {
     LightForm form = LightForm::sky;
@@ -90,6 +91,7 @@ struct Light {
     Vec3 direction{0, 1, 0};      ///< sun: towards it
     float angle = 0.0046f;        ///< sun: half its angular diameter [radians]
     Vec3 corner, edge_a, edge_b;  ///< rectangle: lit on the side of cross(edge_a, edge_b)
+    std::shared_ptr<const Environment> environment;
 };
 
 struct Scene {

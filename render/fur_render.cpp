@@ -81,7 +81,7 @@ struct Options {
     RenderOptions render;
     int samples = 0, width = 0, height = 0;
     double exposure = 0, density = 1;
-    bool json = false, no_light_sampling = false;
+    bool json = false, no_light_sampling = false, layers = false;
     ProgressMode progress = ProgressMode::automatic;
 };
 
@@ -104,14 +104,14 @@ void run(const Options& o, const CLI::App& app) {
     const bool open_ended = options.seconds > 0 || options.error > 0;
     options.samples = o.samples > 0 ? std::uint32_t(o.samples) : open_ended ? 1u << 20 : 64;
     options.unfinished = o.out.front() + ".unfinished";
-    options.key = fmt::format("{}\n{} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
+    options.key = fmt::format("{}\n{} {} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
                               scene.picture.height, o.field, options.path.lobes, o.density, options.path.clamp,
-                              options.seed * 2 + std::uint32_t(options.path.sample_lights), scene.text);
+                              options.seed * 2 + std::uint32_t(options.path.sample_lights), o.layers, scene.text);
 
     const auto start = std::chrono::steady_clock::now();
     const PathTracer tracer(scene, options.path);
     const double building = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    Film film(scene.picture.width, scene.picture.height);
+    Film film(scene.picture.width, scene.picture.height, o.layers);
     Report report;
     const double processor_before = processor_seconds();
     {
@@ -200,6 +200,7 @@ int main(int argc, char** argv) {
     app.add_option("--threads", o.render.threads, "0: all processors")->check(CLI::Range(0, 1024));
     app.add_option("--seed", o.render.seed, "another seed, other noise");
     app.add_flag("--resume", o.render.resume, "go on from OUT.unfinished, which a killed run leaves");
+    app.add_flag("--layers", o.layers, "the EXR gets lobes, direct and indirect light, normals, depth and more");
     app.add_flag("--no-light-sampling", o.no_light_sampling, "find lights by scattering alone (reference)");
     const std::map<std::string, ProgressMode> modes{{"auto", ProgressMode::automatic},
                                                     {"bar", ProgressMode::bar},
@@ -218,6 +219,9 @@ int main(int argc, char** argv) {
         for (const std::string& out : o.out)
             if (!ends_with(out, ".png") && !ends_with(out, ".exr"))
                 throw CLI::ValidationError("-o", "expected a name that ends in .png or .exr, found " + out);
+        if (o.layers &&
+            std::none_of(o.out.begin(), o.out.end(), [](const std::string& s) { return ends_with(s, ".exr"); }))
+            throw CLI::ValidationError("--layers", "expected an -o that ends in .exr");
     } catch (const CLI::Success& e) {
         return app.exit(e);
     } catch (const CLI::ParseError& e) {

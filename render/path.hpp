@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "render/film.hpp"
 #include "render/geometry.hpp"
 #include "render/lights.hpp"
 
@@ -39,14 +40,16 @@ class PathTracer {
 
     /// Radiance along one camera ray. Its random numbers are those of (seed, pixel, sample).
     /// @param timed whether to spend clock readings on the shares of Counts
-    Rgb sample(int x, int y, std::uint32_t sample, std::uint32_t seed, bool timed, Counts& counts) const;
+    /// @param layers null, or what the radiance is made of; the radiance is the same bits
+    Rgb sample(int x, int y, std::uint32_t sample, std::uint32_t seed, bool timed, Counts& counts,
+               Layers* layers = nullptr) const;
 
     const Geometry& geometry() const { return geometry_; }
 
   private:
     Ray camera_ray(int x, int y, Random& random) const;
     template <bool Timed>
-    Rgb trace(Ray ray, Random& random, Counts& counts) const;
+    Rgb trace(Ray ray, Random& random, Counts& counts, Layers* layers) const;
 
     const Scene& scene_;
     PathOptions options_;

@@ -34,6 +34,11 @@ struct FieldInWorld {
 
     Evaluation<3> evaluate(Vec3 drawn) const { return field.evaluate(local(basis, drawn)); }
     Sample<3> sample(RandomNumbers u) const { return field.sample(u); }
+    /// The value of one lobe alone.
+    Vec3 lobe(Lobe k, Vec3 drawn) const {
+        const Colour<3> c = field.keep(lobe_bit(k)).value(local(basis, drawn));
+        return {c[0], c[1], c[2]};
+    }
     Vec3 world(Vector w) const { return basis.to_world({w.x, w.y, w.z}); }
     static Vector local(const Basis& basis, Vec3 w) {
         const Vec3 v = basis.to_local(w);
@@ -50,14 +55,22 @@ class Shading {
         for (const Strands& layer : layers) coats_.push_back(make_coat(scene.materials, layer.along, pack));
     }
 
+    /// Share of the light that leaves the fibre again, of a ray that meets it at the hit's offset.
+    Rgb albedo(const FibreHit& hit) const {
+        const Basis basis = basis_about(hit.tangent);
+        const Vector known = FieldInWorld<int>::local(basis, hit.known);
+        const NearField<3> field =
+            near_field(fibre(hit), known, offset_of(known, FieldInWorld<int>::local(basis, hit.point)));
+        return rgb(lobes_ == all_lobes ? field.albedo() : field.keep(lobes_).albedo());
+    }
+
     /// Calls use(field in world) for the fibre at a hit.
     template <class Use>
     void at(const FibreHit& hit, FieldChoice choice, Use&& use) const {
         const Basis basis = basis_about(hit.tangent);
         const Vector known = FieldInWorld<int>::local(basis, hit.known);
         const float h = offset_of(known, FieldInWorld<int>::local(basis, hit.point));
-        const Coat& coat = coats_[hit.layer];
-        const Fibre<3> fibre = coat.stops.size() == 1 && hit.colour == 1 ? coat.first : fibre_at(coat, hit);
+        const Fibre<3> fibre = this->fibre(hit);
         const bool one_offset = choice == FieldChoice::one_offset ||
                                 (choice == FieldChoice::multiscale && hit.footprint < narrow_footprint);
         if (one_offset) return with_lobes(basis, near_field(fibre, known, h), use);
@@ -115,6 +128,11 @@ class Shading {
         }
         coat.first = make_fibre(coat.stops[0].fur, coat.tables);
         return coat;
+    }
+
+    Fibre<3> fibre(const FibreHit& hit) const {
+        const Coat& coat = coats_[hit.layer];
+        return coat.stops.size() == 1 && hit.colour == 1 ? coat.first : fibre_at(coat, hit);
     }
 
     /// All parameters interpolated between the two stops about the hit.

@@ -92,7 +92,7 @@ TEST_CASE("layers add up to the picture, which is the same bytes without them", 
 TEST_CASE("each lobe's layer is the picture of that lobe alone", "[render][layers]") {
     const Scene scene = lone_fibre(R"([{"light": "sun", "direction": [1, 0.3, 1.5], "diameter": 10, "irradiance": 2},
         {"light": "sun", "direction": [0.2, -0.2, -1], "diameter": 10, "irradiance": 1}])");
-    RenderOptions o = tests::options(512);
+    RenderOptions o = tests::options(1024);
     const Film film = with_layers(scene, o);
     CHECK(mean_of(film, Layers::other) == 0);
     for (const Layers& l : film.layers) {

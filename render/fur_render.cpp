@@ -139,6 +139,7 @@ void run(const Options& o, const CLI::App& app) {
                                {"vertices_per_second", double(n.vertices) / seconds},
                                {"processor_seconds", processor},
                                {"nonfinite", film.nonfinite},
+                               {"clamped", n.clamped},
                                {"samples", film.samples},
                                {"error", film.error()},
                                {"building_seconds", building},
@@ -154,6 +155,7 @@ void run(const Options& o, const CLI::App& app) {
     fmt::print("{}: {} samples per pixel, {:.1f} s, mean {:.4f} {:.4f} {:.4f}, error {:.2g}\n", fmt::join(o.out, ", "),
                film.samples, report.seconds, mean[0], mean[1], mean[2], film.error());
     if (film.nonfinite > 0) fmt::print("{} samples were not finite and count as black\n", film.nonfinite);
+    if (n.clamped > 0) fmt::print("{} path vertices had parameters out of range, which were clamped\n", n.clamped);
     if (!options.stats) return;
     fmt::print("{} strands, {:.0f} MB in Embree ({:.0f} bytes a strand), built in {:.1f} s\n", strands,
                double(bytes) * 1e-6, double(bytes) / double(std::max<std::size_t>(1, strands)), building);

@@ -121,7 +121,7 @@ Strands grow(const Shape& shape, const Layer& layer) {
     }
 
     Strands strands;
-    strands.along = layer.along;
+    strands.along = layer.along, strands.textures = layer.textures;
     strands.colour_noise = layer.colour_noise, strands.seed = layer.seed;
     strands.points.reserve(roots.size() * std::size_t(layer.segments + 3));
     std::vector<float> radius(std::size_t(layer.segments) + 1);

@@ -5,6 +5,7 @@
 #include <ImfHeader.h>
 #include <ImfIO.h>
 #include <ImfInputFile.h>
+#include <png.h>
 
 #include <cmath>
 
@@ -173,10 +174,43 @@ Image read_hdr(const std::string& path, const std::string& bytes) {
     return image;
 }
 
-Image read_image(const std::string& path, const std::string& bytes) {
+Image read_png(const std::string& path, const std::string& bytes, bool linear) {
+    Image image;
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    const auto check = [&](int done) {
+        if (done != 0) return;
+        const std::string message = png.message;
+        png_image_free(&png);
+        throw Error("{}: expected a PNG picture, found {}", path, printable(message));
+    };
+    check(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()));
+    if (std::int64_t(png.width) > most_pixels / std::int64_t(png.height)) {
+        png_image_free(&png);
+        throw Error("{}: expected at most {} pixels, found {} x {}", path, most_pixels, png.width, png.height);
+    }
+    image.width = int(png.width), image.height = int(png.height);
+    const std::size_t count = std::size_t(png.width) * png.height;
+    png.format = PNG_FORMAT_RGB;
+    std::vector<std::uint8_t> values(3 * count);
+    const png_color black{};  // under what is transparent
+    check(png_image_finish_read(&png, &black, values.data(), 0, nullptr));
+    float decoded[256];  // libpng's own linear form has no more digits than the 8 bits
+    for (int i = 0; i < 256; ++i) {
+        const double x = i / 255.0;
+        decoded[i] = float(!linear ? x : x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4));
+    }
+    image.pixels.reserve(count);
+    for (std::size_t i = 0; i < count; ++i)
+        image.pixels.push_back({decoded[values[3 * i]], decoded[values[3 * i + 1]], decoded[values[3 * i + 2]]});
+    return image;
+}
+
+Image read_image(const std::string& path, const std::string& bytes, bool linear) {
+    if (ends_with(path, ".png")) return read_png(path, bytes, linear);
     if (ends_with(path, ".exr")) return read_exr(path, bytes);
     if (ends_with(path, ".hdr")) return read_hdr(path, bytes);
-    throw Error("{}: expected a name that ends in .exr or .hdr", path);
+    throw Error("{}: expected a name that ends in .exr, .hdr or .png", path);
 }
 
 }  // namespace medulla::render

@@ -174,9 +174,12 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts, Layers* layers) c
             fibre.footprint = width / strand.radius;
             fibre.along = strand.along;
             fibre.colour = layer.colour_of(strand.strand);
+            if (!layer.textures.empty())
+                fibre.root = layer.root(strand.strand),
+                fibre.column = unit_float(hash(layer.seed ^ 0x3c6ef372u, strand.strand));
             const Pair a = random.pair(), b = random.pair();
             const float c = options_.field == FieldChoice::one_offset ? 0 : random.number();
-            shading_->at(fibre, options_.field, [&](const auto& field) {
+            counts.clamped += shading_->at(fibre, options_.field, [&](const auto& field) {
                 if (light.pdf > 0) {
                     const Evaluation<3> e = field.evaluate(light.direction);
                     towards = {rgb(e.value), e.pdf};

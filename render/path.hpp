@@ -17,10 +17,11 @@ enum class FieldChoice { one_offset, whole_width, multiscale };
 
 struct Counts {
     std::uint64_t rays = 0, vertices = 0, nonfinite = 0;
+    std::uint64_t clamped = 0;  ///< vertices whose fibre had parameters out of range, or that are no numbers
     /// Of the samples that were timed [ns].
     std::uint64_t traversal = 0, shading = 0, all = 0;
     Counts& operator+=(const Counts& o) {
-        rays += o.rays, vertices += o.vertices, nonfinite += o.nonfinite;
+        rays += o.rays, vertices += o.vertices, nonfinite += o.nonfinite, clamped += o.clamped;
         traversal += o.traversal, shading += o.shading, all += o.all;
         return *this;
     }

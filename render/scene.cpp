@@ -97,9 +97,51 @@ std::vector<Stop> read_along(Fields& f, const std::vector<Material>& materials, 
     return stops;
 }
 
-Layer read_layer(Fields f, const std::vector<Material>& materials, int material) {
+/// The bytes of the file that a field names, beside the scene; its fingerprint goes into scene.text.
+std::string named_file(Fields& f, const char* name, std::uint64_t most, Scene& scene, std::string& path) {
+    path = path_beside(f.file(), f.text(name, ""));
+    std::string bytes;
+    try {
+        bytes = read_file(path, most);
+    } catch (const Error& error) {
+        throw Error("{}: {}", f.place(name), error.what());
+    }
+    scene.text += fmt::format("\n{:016x}", fingerprint(bytes.data(), bytes.size()));
+    return bytes;
+}
+
+std::shared_ptr<const Texture> read_texture(Fields f, Scene& scene) {
+    Texture t;
+    t.sets =
+        static_cast<Sets>(f.choice("sets", {"sigma_ca", "colour", "kappa", "sigma_ms_factor", "sigma_ca_factor"}, 0));
+    t.mapping = static_cast<Mapping>(f.choice("map", {"planar", "around", "strand"}, 0));
+    t.scale = f.number("scale", 1, at_least_0);
+    if (t.mapping != Mapping::strand) t.origin = f.vector("origin", t.origin);
+    if (t.mapping == Mapping::planar) {
+        t.u = f.vector("u", t.u), t.v = f.vector("v", t.v);
+        if (!(dot(t.u, t.u) > 0)) throw Error("{}: expected an edge, found a vector of length 0", f.place("u"));
+        if (!(dot(t.v, t.v) > 0)) throw Error("{}: expected an edge, found a vector of length 0", f.place("v"));
+    }
+    f.has("file");
+    f.done();
+    std::string path;
+    const std::string bytes = named_file(f, "file", greatest_image_file, scene, path);
+    t.image = read_image(path, bytes, t.sets == Sets::colour);
+    return std::make_shared<const Texture>(std::move(t));
+}
+
+std::vector<std::shared_ptr<const Texture>> read_textures(Fields& f, Scene& scene) {
+    std::vector<std::shared_ptr<const Texture>> textures;
+    const json& list = f.list("textures");
+    for (std::size_t i = 0; i < list.size(); ++i)
+        textures.push_back(read_texture({list[i], f.file(), fmt::format("{}/{}", f.pointer("textures"), i)}, scene));
+    return textures;
+}
+
+Layer read_layer(Fields f, Scene& scene, int material) {
     Layer l;
-    l.along = read_along(f, materials, material);
+    l.along = read_along(f, scene.materials, material);
+    l.textures = read_textures(f, scene);
     l.colour_noise = f.number("colour_noise", 0, {0, 10});
     l.density = f.number("density", l.density, positive);
     l.length = f.number("length", l.length, positive),
@@ -117,19 +159,6 @@ Layer read_layer(Fields f, const std::vector<Material>& materials, int material)
     l.seed = std::uint32_t(f.whole("seed", 1, 0, 2000000000));
     f.done();
     return l;
-}
-
-/// The bytes of the file that a field names, beside the scene; its fingerprint goes into scene.text.
-std::string named_file(Fields& f, const char* name, std::uint64_t most, Scene& scene, std::string& path) {
-    path = path_beside(f.file(), f.text(name, ""));
-    std::string bytes;
-    try {
-        bytes = read_file(path, most);
-    } catch (const Error& error) {
-        throw Error("{}: {}", f.place(name), error.what());
-    }
-    scene.text += fmt::format("\n{:016x}", fingerprint(bytes.data(), bytes.size()));
-    return bytes;
 }
 
 Placement read_placement(Fields& f) {
@@ -201,7 +230,7 @@ Object read_object(Fields f, Scene& scene, const json& coats) {
     const std::string pointer = named ? "/coats/" + f.text("coat", "") : f.pointer("coat");
     if (!coat.is_array()) throw Error("{}: {}: expected a list, found {}", f.file(), pointer, quoted(coat));
     for (std::size_t i = 0; i < coat.size(); ++i)
-        o.coat.push_back(read_layer({coat[i], f.file(), fmt::format("{}/{}", pointer, i)}, materials, material));
+        o.coat.push_back(read_layer({coat[i], f.file(), fmt::format("{}/{}", pointer, i)}, scene, material));
     f.done();
     return o;
 }
@@ -212,6 +241,7 @@ Strands read_strand_object(Fields f, Scene& scene) {
     if (f.has("radius")) how.radius = f.number("radius", 0, positive);
     how.radius_scale = f.number("radius_scale", 1, positive);
     const std::vector<Stop> along = read_along(f, scene.materials);
+    const auto textures = read_textures(f, scene);
     const float colour_noise = f.number("colour_noise", 0, {0, 10});
     const auto seed = std::uint32_t(f.whole("seed", 1, 0, 2000000000));
     f.has("strands");
@@ -219,7 +249,8 @@ Strands read_strand_object(Fields f, Scene& scene) {
     std::string path;
     const std::string bytes = named_file(f, "strands", greatest_strand_file, scene, path);
     Strands strands = read_strands(path, bytes, how);
-    strands.along = along, strands.colour_noise = colour_noise, strands.seed = seed;
+    strands.along = along, strands.textures = textures;
+    strands.colour_noise = colour_noise, strands.seed = seed;
     return strands;
 }
 

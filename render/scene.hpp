@@ -11,6 +11,7 @@
 #include "render/environment.hpp"
 #include "render/mesh.hpp"
 #include "render/strands.hpp"
+#include "render/texture.hpp"
 
 namespace medulla::render {
 
@@ -34,6 +35,7 @@ struct Material {
 
 struct Layer {
     std::vector<Stop> along;
+    std::vector<std::shared_ptr<const Texture>> textures;
     float colour_noise = 0;  ///< spread of sigma_ca from strand to strand: factors exp(+-colour_noise)
     float density = 1000;    ///< strands per unit of area
     float length = 0.2f, length_noise = 0.2f;  ///< noise: share of the length, even in +-

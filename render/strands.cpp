@@ -70,7 +70,8 @@ void add_bspline(const std::vector<Vec3>& p, float radius_0, float radius_1, Str
 void thin(Strands& strands, double share) {
     if (share >= 1) return;
     Strands kept;
-    kept.along = strands.along, kept.colour_noise = strands.colour_noise, kept.seed = strands.seed;
+    kept.along = strands.along, kept.textures = strands.textures;
+    kept.colour_noise = strands.colour_noise, kept.seed = strands.seed;
     for (std::size_t i = 0; i < strands.count(); ++i) {
         if (i > 0 && double(unit_float(hash(0x7a3d0b1fu, std::uint32_t(i)))) >= share) continue;
         for (std::size_t k = strands.first_segment[i]; k < strands.first_segment[i + 1]; ++k) {

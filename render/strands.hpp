@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "render/random.hpp"
@@ -16,12 +17,15 @@ struct Stop {
     int material;
 };
 
+struct Texture;
+
 struct CurvePoint {
     float x, y, z, radius;
 };
 
 struct Strands {
     std::vector<Stop> along;
+    std::vector<std::shared_ptr<const Texture>> textures;
     float colour_noise = 0;
     std::uint32_t seed = 0;
     std::vector<CurvePoint> points;               ///< control points
@@ -31,6 +35,12 @@ struct Strands {
 
     std::size_t count() const { return first_segment.size() - 1; }
     std::uint32_t segments(std::uint32_t strand) const { return first_segment[strand + 1] - first_segment[strand]; }
+    /// Where a strand's spline begins.
+    Vec3 root(std::uint32_t strand) const {
+        const CurvePoint* p = points.data() + first_point[first_segment[strand]];
+        return {(p[0].x + 4 * p[1].x + p[2].x) / 6, (p[0].y + 4 * p[1].y + p[2].y) / 6,
+                (p[0].z + 4 * p[1].z + p[2].z) / 6};
+    }
     /// Factor of sigma_ca.
     float colour_of(std::uint32_t strand) const {
         return colour_noise == 0 ? 1 : std::exp(colour_noise * (2 * unit_float(hash(seed ^ 0x2545f491u, strand)) - 1));

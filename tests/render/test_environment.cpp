@@ -195,7 +195,7 @@ TEST_CASE("a bad map is refused in one line", "[render][environment]") {
         std::string name, bytes;
         std::vector<std::string> says;
     } cases[] = {
-        {"a.jpg", "", {".exr or .hdr"}},
+        {"a.jpg", "", {".exr, .hdr or .png"}},
         {"a.hdr", "#?RGB\n\n", {"#?RADIANCE"}},
         {"a.hdr", "#?RGBE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n" + p, {"FORMAT=32-bit_rle_rgbe", "xyze"}},
         {"a.hdr", hdr(p, "+Y 1 +X 1"), {"-Y HEIGHT", "+Y 1"}},

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "render/error.hpp"
+#include "render/file.hpp"
 
 namespace medulla::render {
 namespace {
@@ -15,16 +16,15 @@ struct Header {
     char magic[8];
     std::uint64_t key, pixels, nonfinite;
     std::uint32_t samples, width, height, reserved;
-    std::uint64_t checksum;  ///< of the pixels
+    std::uint64_t checksum;  ///< of the pixels and layers
 };
 static_assert(sizeof(Header) == 56);
-constexpr char magic[8] = {'f', 'u', 'r', 'f', 'i', 'l', 'm', '1'};
-
-std::uint64_t fnv(const void* bytes, std::size_t count) {  // FNV-1a
-    std::uint64_t h = 0xcbf29ce484222325u;
-    for (std::size_t i = 0; i < count; ++i) h = (h ^ static_cast<const unsigned char*>(bytes)[i]) * 0x100000001b3u;
-    return h;
+std::uint64_t checksum_of(const Film& film) {
+    return fingerprint(film.pixels.data(), film.pixels.size() * sizeof(Pixel)) +
+           31 * fingerprint(film.layers.data(), film.layers.size() * sizeof(Layers));
 }
+
+constexpr char magic[8] = {'f', 'u', 'r', 'f', 'i', 'l', 'm', '1'};
 
 }  // namespace
 
@@ -53,16 +53,17 @@ void Film::mean(double (&rgb)[3]) const {
 }
 
 void save(const Film& film, const std::string& key, const std::string& path) {
-    const std::size_t bytes = film.pixels.size() * sizeof(Pixel);
     Header header{};
     std::memcpy(header.magic, magic, sizeof magic);
-    header.key = fnv(key.data(), key.size()), header.pixels = film.pixels.size(), header.nonfinite = film.nonfinite;
+    header.key = fingerprint(key.data(), key.size()), header.pixels = film.pixels.size(),
+    header.nonfinite = film.nonfinite;
     header.samples = film.samples, header.width = std::uint32_t(film.width), header.height = std::uint32_t(film.height);
-    header.checksum = fnv(film.pixels.data(), bytes);
+    header.checksum = checksum_of(film);
     const std::string temporary = path + ".new";
     std::ofstream file(temporary, std::ios::binary);
     file.write(reinterpret_cast<const char*>(&header), sizeof header);
-    file.write(reinterpret_cast<const char*>(film.pixels.data()), std::streamsize(bytes));
+    file.write(reinterpret_cast<const char*>(film.pixels.data()), std::streamsize(film.pixels.size() * sizeof(Pixel)));
+    file.write(reinterpret_cast<const char*>(film.layers.data()), std::streamsize(film.layers.size() * sizeof(Layers)));
     file.close();
     if (!file || std::rename(temporary.c_str(), path.c_str()) != 0)
         throw Error("{}: cannot be written: {}", path, std::strerror(errno));
@@ -75,13 +76,12 @@ bool load(Film& film, const std::string& key, const std::string& path) {
     file.read(reinterpret_cast<char*>(&header), sizeof header);
     if (!file || std::memcmp(header.magic, magic, sizeof magic) != 0)
         throw Error("{}: expected an unfinished picture of fur-render, found another file", path);
-    if (header.key != fnv(key.data(), key.size()) || header.pixels != film.pixels.size() ||
+    if (header.key != fingerprint(key.data(), key.size()) || header.pixels != film.pixels.size() ||
         header.width != std::uint32_t(film.width) || header.height != std::uint32_t(film.height))
         throw Error("{}: expected the same scene and options; remove the file to begin anew", path);
-    const std::size_t bytes = film.pixels.size() * sizeof(Pixel);
-    file.read(reinterpret_cast<char*>(film.pixels.data()), std::streamsize(bytes));
-    if (!file || fnv(film.pixels.data(), bytes) != header.checksum)
-        throw Error("{}: damaged; remove the file to begin anew", path);
+    file.read(reinterpret_cast<char*>(film.pixels.data()), std::streamsize(film.pixels.size() * sizeof(Pixel)));
+    file.read(reinterpret_cast<char*>(film.layers.data()), std::streamsize(film.layers.size() * sizeof(Layers)));
+    if (!file || checksum_of(film) != header.checksum) throw Error("{}: damaged; remove the file to begin anew", path);
     film.samples = header.samples, film.nonfinite = header.nonfinite;
     return true;
 }

@@ -21,13 +21,34 @@ struct Pixel {
     double luminance_sum() const { return 0.2126 * sum[0] + 0.7152 * sum[1] + 0.0722 * sum[2]; }
 };
 
+/// What one sample, or the sum of a pixel's samples, is made of.
+struct Layers {
+    static constexpr int other = 6;  ///< paths whose first surface is no fibre, and lights that the camera sees
+    Rgb lobe[7];                     ///< radiance by the lobe of the first surface, a fibre: R, TT, .. residual; other
+    Rgb direct;                      ///< radiance by one scattering or none
+    Rgb albedo;                      ///< of the first surface
+    Vec3 normal, tangent;            ///< of the first surface, in the world; the tangent of a skin is 0
+    float depth = 0;                 ///< of the first surface, along the view
+    float hit = 0;                   ///< 1 where there is one
+
+    Layers& operator+=(const Layers& o) {
+        for (int k = 0; k < 7; ++k) lobe[k] += o.lobe[k];
+        direct += o.direct, albedo += o.albedo, normal += o.normal, tangent += o.tangent;
+        depth += o.depth, hit += o.hit;
+        return *this;
+    }
+};
+static_assert(sizeof(Layers) == 35 * sizeof(float));
+
 struct Film {
     int width = 0, height = 0;
     std::uint32_t samples = 0;    ///< per pixel, the same in all of them
     std::uint64_t nonfinite = 0;  ///< samples that were dropped (and count as black)
     std::vector<Pixel> pixels;    ///< row by row from the top
+    std::vector<Layers> layers;   ///< of each pixel, if kept
 
-    Film(int w, int h) : width(w), height(h), pixels(std::size_t(w) * std::size_t(h)) {}
+    Film(int w, int h, bool keep_layers = false)
+        : width(w), height(h), pixels(std::size_t(w) * std::size_t(h)), layers(keep_layers ? pixels.size() : 0) {}
     Rgb colour(std::size_t i) const {
         const double s = 1.0 / double(samples);
         return {float(pixels[i].sum[0] * s), float(pixels[i].sum[1] * s), float(pixels[i].sum[2] * s)};

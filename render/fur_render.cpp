@@ -81,7 +81,7 @@ struct Options {
     RenderOptions render;
     int samples = 0, width = 0, height = 0;
     double exposure = 0, density = 1;
-    bool json = false, no_light_sampling = false;
+    bool json = false, no_light_sampling = false, layers = false;
     ProgressMode progress = ProgressMode::automatic;
 };
 
@@ -93,6 +93,7 @@ void run(const Options& o, const CLI::App& app) {
     if (!o.tone.empty()) scene.picture.filmic = o.tone == "filmic";
     for (Object& object : scene.objects)
         for (Layer& layer : object.coat) layer.density *= float(o.density);
+    for (Strands& strands : scene.strands) thin(strands, o.density);
 
     RenderOptions options = o.render;
     options.path.field = o.field == "near"  ? FieldChoice::one_offset
@@ -103,14 +104,14 @@ void run(const Options& o, const CLI::App& app) {
     const bool open_ended = options.seconds > 0 || options.error > 0;
     options.samples = o.samples > 0 ? std::uint32_t(o.samples) : open_ended ? 1u << 20 : 64;
     options.unfinished = o.out.front() + ".unfinished";
-    options.key = fmt::format("{}\n{} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
+    options.key = fmt::format("{}\n{} {} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
                               scene.picture.height, o.field, options.path.lobes, o.density, options.path.clamp,
-                              options.seed * 2 + std::uint32_t(options.path.sample_lights), scene.text);
+                              options.seed * 2 + std::uint32_t(options.path.sample_lights), o.layers, scene.text);
 
     const auto start = std::chrono::steady_clock::now();
     const PathTracer tracer(scene, options.path);
     const double building = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    Film film(scene.picture.width, scene.picture.height);
+    Film film(scene.picture.width, scene.picture.height, o.layers);
     Report report;
     const double processor_before = processor_seconds();
     {
@@ -138,6 +139,7 @@ void run(const Options& o, const CLI::App& app) {
                                {"vertices_per_second", double(n.vertices) / seconds},
                                {"processor_seconds", processor},
                                {"nonfinite", film.nonfinite},
+                               {"clamped", n.clamped},
                                {"samples", film.samples},
                                {"error", film.error()},
                                {"building_seconds", building},
@@ -153,6 +155,7 @@ void run(const Options& o, const CLI::App& app) {
     fmt::print("{}: {} samples per pixel, {:.1f} s, mean {:.4f} {:.4f} {:.4f}, error {:.2g}\n", fmt::join(o.out, ", "),
                film.samples, report.seconds, mean[0], mean[1], mean[2], film.error());
     if (film.nonfinite > 0) fmt::print("{} samples were not finite and count as black\n", film.nonfinite);
+    if (n.clamped > 0) fmt::print("{} path vertices had parameters out of range, which were clamped\n", n.clamped);
     if (!options.stats) return;
     fmt::print("{} strands, {:.0f} MB in Embree ({:.0f} bytes a strand), built in {:.1f} s\n", strands,
                double(bytes) * 1e-6, double(bytes) / double(std::max<std::size_t>(1, strands)), building);
@@ -199,6 +202,7 @@ int main(int argc, char** argv) {
     app.add_option("--threads", o.render.threads, "0: all processors")->check(CLI::Range(0, 1024));
     app.add_option("--seed", o.render.seed, "another seed, other noise");
     app.add_flag("--resume", o.render.resume, "go on from OUT.unfinished, which a killed run leaves");
+    app.add_flag("--layers", o.layers, "the EXR gets lobes, direct and indirect light, normals, depth and more");
     app.add_flag("--no-light-sampling", o.no_light_sampling, "find lights by scattering alone (reference)");
     const std::map<std::string, ProgressMode> modes{{"auto", ProgressMode::automatic},
                                                     {"bar", ProgressMode::bar},
@@ -217,6 +221,9 @@ int main(int argc, char** argv) {
         for (const std::string& out : o.out)
             if (!ends_with(out, ".png") && !ends_with(out, ".exr"))
                 throw CLI::ValidationError("-o", "expected a name that ends in .png or .exr, found " + out);
+        if (o.layers &&
+            std::none_of(o.out.begin(), o.out.end(), [](const std::string& s) { return ends_with(s, ".exr"); }))
+            throw CLI::ValidationError("--layers", "expected an -o that ends in .exr");
     } catch (const CLI::Success& e) {
         return app.exit(e);
     } catch (const CLI::ParseError& e) {

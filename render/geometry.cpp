@@ -22,9 +22,10 @@ void filter(const RTCFilterFunctionNArguments* arguments) {
         if (arguments->geometryUserPtr == nullptr) {
             refused = hit.primID == start.part;
         } else {
-            const auto segments = std::uint32_t(static_cast<const Strands*>(arguments->geometryUserPtr)->segments);
-            refused = hit.primID / segments == start.part &&
-                      std::abs(float(hit.primID % segments) + hit.u - start.along) < start.reach;
+            const auto& strands = *static_cast<const Strands*>(arguments->geometryUserPtr);
+            const std::uint32_t strand = strands.strand_of[hit.primID];
+            refused = strand == start.part &&
+                      std::abs(float(hit.primID - strands.first_segment[strand]) + hit.u - start.along) < start.reach;
         }
     }
     if (refused) arguments->valid[0] = 0;
@@ -54,7 +55,11 @@ Geometry::Geometry(const Scene& scene) {
     scene_ = rtcNewScene(device_);
     rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
     for (const Object& object : scene.objects)
-        for (const Layer& layer : object.coat) strands_.push_back(grow(object.shape, layer));
+        for (const Layer& layer : object.coat) {
+            strands_.push_back(grow(object.shape, layer));
+            if (strands_.back().count() == 0) throw Error("coat: expected a surface that grows hair, found none");
+        }
+    strands_.insert(strands_.end(), scene.strands.begin(), scene.strands.end());
     for (const SingleFibre& fibre : scene.fibres) strands_.push_back(strand_of(fibre));
     for (const Object& object : scene.objects)
         if (object.has_skin) meshes_.push_back(mesh_of(object.shape, object.skin));
@@ -74,13 +79,9 @@ Geometry::~Geometry() {
 }
 
 void Geometry::add(Strands& strands) {
-    const std::size_t count = strands.count(), segments = std::size_t(strands.segments);
     RTCGeometry curves = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE);
-    auto* index = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(curves, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT,
-                                                                      sizeof(std::uint32_t), count * segments));
-    if (index == nullptr) throw Error("embree: no memory for {} strands", count);
-    for (std::size_t i = 0; i < count; ++i)
-        for (std::size_t k = 0; k < segments; ++k) *index++ = std::uint32_t(i * (segments + 3) + k);
+    rtcSetSharedGeometryBuffer(curves, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, strands.first_point.data(), 0,
+                               sizeof(std::uint32_t), strands.first_point.size());
     strands.points.reserve(strands.points.size() + 1);  // Embree reads 16 bytes at the last point's address and on
     rtcSetSharedGeometryBuffer(curves, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, strands.points.data(), 0,
                                sizeof(CurvePoint), strands.points.size());
@@ -130,9 +131,8 @@ bool Geometry::blocked(const Ray& ray, float distance) const {
 
 StrandHit Geometry::strand_hit(const Hit& hit) const {
     const Strands& s = strands_[hit.geometry];
-    const auto segments = std::uint32_t(s.segments);
-    const std::uint32_t strand = hit.primitive / segments, segment = hit.primitive % segments;
-    const CurvePoint* p = s.points.data() + std::size_t(strand) * (segments + 3) + segment;
+    const std::uint32_t strand = s.strand_of[hit.primitive], segment = hit.primitive - s.first_segment[strand];
+    const CurvePoint* p = s.points.data() + s.first_point[hit.primitive];
     const float u = hit.u, v = 1 - u;
     // The uniform cubic B-spline and its derivative.
     const float b[4] = {v * v * v / 6, (4 - 6 * u * u + 3 * u * u * u) / 6, (4 - 6 * v * v + 3 * v * v * v) / 6,
@@ -144,9 +144,13 @@ StrandHit Geometry::strand_hit(const Hit& hit) const {
         const Vec3 q{p[k].x, p[k].y, p[k].z};
         r.axis += b[k] * q, speed += d[k] * q, r.radius += b[k] * p[k].radius;
     }
-    const float rate = length(speed);
+    float rate = length(speed);
+    if (!(rate > 0)) {  // a Bezier end with a doubled control point: the direction just inside
+        speed = Vec3{p[3].x, p[3].y, p[3].z} - Vec3{p[0].x, p[0].y, p[0].z};
+        rate = length(speed);
+    }
     r.tangent = (1 / rate) * speed;
-    r.along = (float(segment) + u) / float(segments);
+    r.along = (float(segment) + u) / float(s.segments(strand));
     r.strand = strand;
     r.start = {hit.geometry, strand, float(segment) + u, 4 * r.radius / rate};
     return r;
@@ -155,9 +159,9 @@ StrandHit Geometry::strand_hit(const Hit& hit) const {
 SkinHit Geometry::skin_hit(const Hit& hit) const {
     const Mesh& m = meshes_[hit.geometry - strands_.size()];
     const std::uint32_t *i = m.indices.data() + 3 * std::size_t(hit.primitive), a = i[0], b = i[1], c = i[2];
-    const float u = hit.u, v = hit.v, w = 1 - u - v;
-    return {w * m.positions[a] + u * m.positions[b] + v * m.positions[c],
-            normalise(w * m.normals[a] + u * m.normals[b] + v * m.normals[c]),
+    const SurfacePoint p = m.at(hit.primitive, hit.u, hit.v);
+    return {p.position,
+            p.normal,
             normalise(cross(m.positions[b] - m.positions[a], m.positions[c] - m.positions[a])),
             m.albedo,
             {hit.geometry, hit.primitive, 0, 0}};

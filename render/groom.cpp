@@ -86,7 +86,8 @@ std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::
     Sequence random(seed);
     PointGrid grid(distance);
     std::vector<SurfacePoint> points;
-    for (std::size_t tries = 0; points.size() < count && tries < 30 * count; ++tries) {
+    std::size_t placed = 0;
+    for (std::size_t tries = 0; placed < count && tries < 30 * count; ++tries) {
         const SurfacePoint p = sample_surface(shape, random);
         bool free = true;
         grid.around(p.position, [&](Vec3 q, std::uint32_t) {
@@ -94,24 +95,11 @@ std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::
             free = free && dot(d, d) >= distance * distance;
         });
         if (!free) continue;
-        grid.add(p.position, std::uint32_t(points.size()));
-        points.push_back(p);
+        grid.add(p.position, std::uint32_t(placed++));
+        if (p.fur > 0) points.push_back(p);  // a bald place takes its share of the strands
     }
     return points;
 }
-
-namespace {
-
-/// Appends a strand through `line`: one more point at either end so that the spline reaches both.
-void append(const std::vector<Vec3>& line, const std::vector<float>& radius, std::vector<CurvePoint>& points) {
-    const auto put = [&](Vec3 p, float r) { points.push_back({p.x, p.y, p.z, r}); };
-    const std::size_t last = line.size() - 1;
-    put(2 * line[0] - line[1], 2 * radius[0] - radius[1]);
-    for (std::size_t k = 0; k <= last; ++k) put(line[k], radius[k]);
-    put(2 * line[last] - line[last - 1], std::max(0.0f, 2 * radius[last] - radius[last - 1]));
-}
-
-}  // namespace
 
 Strands grow(const Shape& shape, const Layer& layer) {
     const double wanted = double(layer.density) * double(area_of(shape));
@@ -128,12 +116,12 @@ Strands grow(const Shape& shape, const Layer& layer) {
             guide_grid.add(centre.position, std::uint32_t(guides.size()));
             Sequence random(hash(layer.seed ^ 0x7f4a7c15u, std::uint32_t(guides.size())));
             const float a = random.even(), b = random.even();
-            guides.push_back(combed(centre, layer, layer.length, a, b));
+            guides.push_back(combed(centre, layer, centre.fur * layer.length, a, b));
         }
     }
 
     Strands strands;
-    strands.segments = layer.segments, strands.along = layer.along;
+    strands.along = layer.along, strands.textures = layer.textures;
     strands.colour_noise = layer.colour_noise, strands.seed = layer.seed;
     strands.points.reserve(roots.size() * std::size_t(layer.segments + 3));
     std::vector<float> radius(std::size_t(layer.segments) + 1);
@@ -143,7 +131,7 @@ Strands grow(const Shape& shape, const Layer& layer) {
     }
     for (std::size_t i = 0; i < roots.size(); ++i) {
         Sequence random(hash(layer.seed, std::uint32_t(i)));
-        const float length = layer.length * (1 + layer.length_noise * random.even());
+        const float length = roots[i].fur * layer.length * (1 + layer.length_noise * random.even());
         const float a = random.even(), b = random.even(), phase = 2 * pi_f * random();
         std::vector<Vec3> line = combed(roots[i], layer, length, a, b);
         if (!guides.empty()) {
@@ -170,18 +158,18 @@ Strands grow(const Shape& shape, const Layer& layer) {
             }
             line = curled;
         }
-        append(line, radius, strands.points);
+        append_along(line, radius, strands);
     }
     return strands;
 }
 
 Strands strand_of(const SingleFibre& fibre) {
     Strands strands;
-    strands.segments = int(fibre.points.size()) - 1, strands.along = fibre.along;
+    strands.along = fibre.along;
     std::vector<float> radius;
     for (std::size_t k = 0; k < fibre.points.size(); ++k)
-        radius.push_back(fibre.radius * mix(1.0f, fibre.tip, float(k) / float(strands.segments)));
-    append(fibre.points, radius, strands.points);
+        radius.push_back(fibre.radius * mix(1.0f, fibre.tip, float(k) / float(fibre.points.size() - 1)));
+    append_through(fibre.points, radius, strands);
     return strands;
 }
 

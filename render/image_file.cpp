@@ -9,8 +9,10 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <functional>
 #include <vector>
 
+#include "medulla/fur_parameters.hpp"
 #include "render/error.hpp"
 #include "render/random.hpp"
 
@@ -47,25 +49,64 @@ void write_png(const Film& film, const Picture& picture, const std::string& path
     if (std::fclose(file) != 0 || !written) throw Error("{}: cannot be written: {}", path, image.message);
 }
 
+namespace {
+
+/// A channel's name, and its value of a pixel.
+struct Channel {
+    std::string name;
+    std::function<float(std::size_t)> value;
+};
+
+void add(std::vector<Channel>& channels, const std::string& layer, const char* names,
+         const std::function<Vec3(std::size_t)>& value) {
+    channels.push_back({layer + names[0], [=](std::size_t i) { return value(i).x; }});
+    channels.push_back({layer + names[1], [=](std::size_t i) { return value(i).y; }});
+    channels.push_back({layer + names[2], [=](std::size_t i) { return value(i).z; }});
+}
+
+std::vector<Channel> channels_of(const Film& film) {
+    std::vector<Channel> channels;
+    add(channels, "", "RGB", [&](std::size_t i) { return film.colour(i); });
+    channels.push_back({"standard_error.Y", [&](std::size_t i) { return float(film.standard_error(i)); }});
+    if (film.layers.empty()) return channels;
+    const float share = 1 / float(film.samples);
+    const std::vector<Layers>& all = film.layers;
+    for (int k = 0; k < 7; ++k)
+        add(channels, k == Layers::other ? "other." : fmt::format("lobe_{}.", lobe_names[k]), "RGB",
+            [=, &all](std::size_t i) { return share * all[i].lobe[k]; });
+    add(channels, "direct.", "RGB", [=, &all](std::size_t i) { return share * all[i].direct; });
+    add(channels, "indirect.", "RGB",
+        [=, &all, &film](std::size_t i) { return film.colour(i) - share * all[i].direct; });
+    add(channels, "albedo.", "RGB", [=, &all](std::size_t i) { return share * all[i].albedo; });
+    add(channels, "normal.", "XYZ", [=, &all](std::size_t i) { return share * all[i].normal; });
+    add(channels, "tangent.", "XYZ", [=, &all](std::size_t i) { return share * all[i].tangent; });
+    channels.push_back(
+        {"depth.Z", [=, &all](std::size_t i) { return all[i].hit > 0 ? all[i].depth / all[i].hit : 0; }});
+    channels.push_back({"A", [=, &all](std::size_t i) { return share * all[i].hit; }});
+    return channels;
+}
+
+}  // namespace
+
 void write_exr(const Film& film, const std::string& path) {
-    const char* names[4] = {"R", "G", "B", "standard_error.Y"};
-    std::vector<float> planes[4];
-    for (std::size_t i = 0; i < film.pixels.size(); ++i) {
-        const Rgb c = film.colour(i);
-        planes[0].push_back(c.x), planes[1].push_back(c.y), planes[2].push_back(c.z);
-        planes[3].push_back(float(film.standard_error(i)));
-    }
+    const std::vector<Channel> channels = channels_of(film);
+    const std::size_t width = std::size_t(film.width);
+    std::vector<float> row(channels.size() * width);  // one of each: no second picture in memory
     try {
         Imf::Header header(film.width, film.height);
         Imf::FrameBuffer buffer;
-        for (int k = 0; k < 4; ++k) {
-            header.channels().insert(names[k], Imf::Channel(Imf::FLOAT));
-            buffer.insert(names[k], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(planes[k].data()), sizeof(float),
-                                               sizeof(float) * std::size_t(film.width)));
+        for (std::size_t k = 0; k < channels.size(); ++k) {
+            header.channels().insert(channels[k].name, Imf::Channel(Imf::FLOAT));
+            buffer.insert(channels[k].name,
+                          Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(row.data() + k * width), sizeof(float), 0));
         }
         Imf::OutputFile file(path.c_str(), header);
         file.setFrameBuffer(buffer);
-        file.writePixels(film.height);
+        for (std::size_t y = 0; y < std::size_t(film.height); ++y) {
+            for (std::size_t k = 0; k < channels.size(); ++k)
+                for (std::size_t x = 0; x < width; ++x) row[k * width + x] = channels[k].value(y * width + x);
+            file.writePixels(1);
+        }
     } catch (const std::exception& error) {
         throw Error("{}: cannot be written: {}", path, error.what());
     }

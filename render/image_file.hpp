@@ -10,7 +10,8 @@ namespace medulla::render {
 
 /// 8 bits a channel, sRGB.
 void write_png(const Film& film, const Picture& picture, const std::string& path);
-/// R, G, B: linear radiance, primaries of sRGB; standard_error.Y: that of the luminance. 32-bit floats.
+/// R, G, B: linear radiance, primaries of sRGB; standard_error.Y: that of the luminance; the film's layers, if it
+/// has them (docs/render.md names them). 32-bit floats.
 void write_exr(const Film& film, const std::string& path);
 
 /// Linear [0, infinity) to display-linear [0, 1].

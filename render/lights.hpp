@@ -44,6 +44,11 @@ class Lights {
                 s.pdf = choice_ * rectangle_pdf(light, s.direction, s.distance);
                 break;
             }
+            case LightForm::environment:
+                s.direction = light.environment->sample(u);
+                s.radiance = light.environment->radiance(s.direction);
+                s.pdf = choice_ * light.environment->pdf(s.direction);
+                break;
         }
         return s;
     }
@@ -66,6 +71,9 @@ class Lights {
                     visit(light.radiance, choice_ * rectangle_pdf(light, direction, t));
             } else if (escaped && light.form == LightForm::sky) {
                 visit(light.radiance, choice_ / (4 * pi_f));
+            } else if (escaped && light.form == LightForm::environment) {
+                const Rgb radiance = light.environment->radiance(direction);
+                if (greatest(radiance) > 0) visit(radiance, choice_ * light.environment->pdf(direction));
             } else if (escaped) {
                 const float cap = cap_of(light);
                 const Vec3 off = direction - light.direction;  // 1 - cos = |off|^2 / 2, without loss of digits

@@ -55,6 +55,24 @@ struct Next {
     float pdf = 0;  ///< 0: the path ends
 };
 
+/// Parts of 1, by lobe; all of it is `other` until a path's first fibre.
+struct Shares {
+    Rgb of[7];
+    Shares() { of[Layers::other] = {1, 1, 1}; }
+};
+
+template <class Field>
+Shares shares_of(const FieldInWorld<Field>& field, Vec3 direction) {
+    Shares shares;
+    Rgb value[all_lobe_count], sum;
+    for (int k = 0; k < all_lobe_count; ++k) sum += value[k] = field.lobe(static_cast<Lobe>(k), direction);
+    const auto part = [](float x, float of) { return of > 0 ? x / of : 0; };
+    for (int k = 0; k < all_lobe_count; ++k)
+        shares.of[k] = {part(value[k].x, sum.x), part(value[k].y, sum.y), part(value[k].z, sum.z)};
+    shares.of[Layers::other] = {sum.x > 0 ? 0.0f : 1.0f, sum.y > 0 ? 0.0f : 1.0f, sum.z > 0 ? 0.0f : 1.0f};
+    return shares;
+}
+
 float tent(float u) { return u < 0.5f ? std::sqrt(2 * u) - 1 : 1 - std::sqrt(2 - 2 * u); }
 
 }  // namespace
@@ -89,29 +107,38 @@ Ray PathTracer::camera_ray(int x, int y, Random& random) const {
     return {c.from + shift, normalise(c.focus * direction - shift), {}};
 }
 
-Rgb PathTracer::sample(int x, int y, std::uint32_t sample, std::uint32_t seed, bool timed, Counts& counts) const {
+Rgb PathTracer::sample(int x, int y, std::uint32_t sample, std::uint32_t seed, bool timed, Counts& counts,
+                       Layers* layers) const {
     Random random(seed, std::uint32_t(y) * std::uint32_t(scene_.picture.width) + std::uint32_t(x), sample);
     const Ray ray = camera_ray(x, y, random);
     Rgb radiance;
     if (timed) {
         const Stopwatch<true> watch(counts.all);
-        radiance = trace<true>(ray, random, counts);
+        radiance = trace<true>(ray, random, counts, layers);
     } else {
-        radiance = trace<false>(ray, random, counts);
+        radiance = trace<false>(ray, random, counts, layers);
     }
     if (finite(radiance)) return radiance;
     ++counts.nonfinite;
+    if (layers != nullptr) *layers = {};
     return {};
 }
 
 template <bool Timed>
-Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts) const {
+Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts, Layers* layers) const {
+    // What part of the light of later vertices, and of the first one's light sample, each lobe of the first has sent
+    // on.
+    Shares onwards, to_light;
     Rgb sum, throughput{1, 1, 1};
     float pdf = 0;  // of the direction that was drawn; 0: the camera's, which no light sample competes with
     float width = 0, spread = pixel_angle_;
-    const auto add = [&](Rgb light, bool direct) {
+    const auto add = [&](Rgb light, bool direct, const Shares& shares) {
         const float y = luminance(light);
-        sum += !direct && options_.clamp > 0 && y > options_.clamp ? (options_.clamp / y) * light : light;
+        if (!direct && options_.clamp > 0 && y > options_.clamp) light = (options_.clamp / y) * light;
+        sum += light;
+        if (layers == nullptr) return;
+        if (direct) layers->direct += light;
+        for (int k = 0; k < 7; ++k) layers->lobe[k] += shares.of[k] * light;
     };
     for (int vertex = 0; vertex < most_vertices; ++vertex) {
         Hit hit;
@@ -123,7 +150,7 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts) const {
         const float reach = hit ? hit.distance : std::numeric_limits<float>::infinity();
         lights_.met(ray.origin, ray.direction, reach, [&](Rgb radiance, float light_pdf) {
             const bool alone = pdf == 0 || !options_.sample_lights;
-            add((alone ? 1.0f : share_of(pdf, light_pdf)) * (throughput * radiance), vertex <= 1);
+            add((alone ? 1.0f : share_of(pdf, light_pdf)) * (throughput * radiance), vertex <= 1, onwards);
         });
         if (!hit) break;
         ++counts.vertices;
@@ -147,16 +174,27 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts) const {
             fibre.footprint = width / strand.radius;
             fibre.along = strand.along;
             fibre.colour = layer.colour_of(strand.strand);
+            if (!layer.textures.empty())
+                fibre.root = layer.root(strand.strand),
+                fibre.column = unit_float(hash(layer.seed ^ 0x3c6ef372u, strand.strand));
             const Pair a = random.pair(), b = random.pair();
             const float c = options_.field == FieldChoice::one_offset ? 0 : random.number();
-            shading_->at(fibre, options_.field, [&](const auto& field) {
+            counts.clamped += shading_->at(fibre, options_.field, [&](const auto& field) {
                 if (light.pdf > 0) {
                     const Evaluation<3> e = field.evaluate(light.direction);
                     towards = {rgb(e.value), e.pdf};
                 }
                 const Sample<3> drawn = field.sample({a.x, a.y, b.x, b.y, c});
                 if (drawn.valid) next = {field.world(drawn.direction), rgb(drawn.weight), drawn.pdf};
+                if (layers == nullptr || vertex > 0) return;
+                if (light.pdf > 0) to_light = shares_of(field, light.direction);
+                if (drawn.valid) onwards = shares_of(field, next.direction);
             });
+            if (layers != nullptr && vertex == 0) {
+                const Vec3 out = fibre.point - dot(fibre.point, strand.tangent) * strand.tangent;
+                layers->normal = normalise(out), layers->tangent = strand.tangent;
+                layers->albedo = shading_->albedo(fibre);
+            }
             spread = std::max(spread, spread_of_fibre);
         } else {
             const SkinHit skin = geometry_.skin_hit(hit);
@@ -175,7 +213,10 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts) const {
             next.pdf = cosine(next.direction) / pi_f;
             next.weight = skin.albedo;
             width += hit.distance * spread, spread = 1;
+            if (layers != nullptr && vertex == 0) layers->normal = skin.normal, layers->albedo = skin.albedo;
         }
+        if (layers != nullptr && vertex == 0)
+            layers->depth = hit.distance * dot(ray.direction, forward_), layers->hit = 1;
 
         if (light.pdf > 0 && greatest(towards.value) > 0) {
             bool blocked;
@@ -186,7 +227,7 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts) const {
             ++counts.rays;
             if (!blocked)
                 add((share_of(light.pdf, towards.pdf) / light.pdf) * (throughput * towards.value * light.radiance),
-                    vertex == 0);
+                    vertex == 0, vertex == 0 ? to_light : onwards);
         }
         if (!(next.pdf > 0)) break;
         throughput *= next.weight;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "render/film.hpp"
 #include "render/geometry.hpp"
 #include "render/lights.hpp"
 
@@ -16,10 +17,11 @@ enum class FieldChoice { one_offset, whole_width, multiscale };
 
 struct Counts {
     std::uint64_t rays = 0, vertices = 0, nonfinite = 0;
+    std::uint64_t clamped = 0;  ///< vertices whose fibre had parameters out of range, or that are no numbers
     /// Of the samples that were timed [ns].
     std::uint64_t traversal = 0, shading = 0, all = 0;
     Counts& operator+=(const Counts& o) {
-        rays += o.rays, vertices += o.vertices, nonfinite += o.nonfinite;
+        rays += o.rays, vertices += o.vertices, nonfinite += o.nonfinite, clamped += o.clamped;
         traversal += o.traversal, shading += o.shading, all += o.all;
         return *this;
     }
@@ -39,14 +41,16 @@ class PathTracer {
 
     /// Radiance along one camera ray. Its random numbers are those of (seed, pixel, sample).
     /// @param timed whether to spend clock readings on the shares of Counts
-    Rgb sample(int x, int y, std::uint32_t sample, std::uint32_t seed, bool timed, Counts& counts) const;
+    /// @param layers null, or what the radiance is made of; the radiance is the same bits
+    Rgb sample(int x, int y, std::uint32_t sample, std::uint32_t seed, bool timed, Counts& counts,
+               Layers* layers = nullptr) const;
 
     const Geometry& geometry() const { return geometry_; }
 
   private:
     Ray camera_ray(int x, int y, Random& random) const;
     template <bool Timed>
-    Rgb trace(Ray ray, Random& random, Counts& counts) const;
+    Rgb trace(Ray ray, Random& random, Counts& counts, Layers* layers) const;
 
     const Scene& scene_;
     PathOptions options_;

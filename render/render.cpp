@@ -40,10 +40,14 @@ Report render(const PathTracer& tracer, const RenderOptions& options, Film& film
                 const int x0 = t % columns * tile, y0 = t / columns * tile;
                 for (int y = y0; y < std::min(film.height, y0 + tile); ++y)
                     for (int x = x0; x < std::min(film.width, x0 + tile); ++x) {
-                        Pixel& pixel = film.pixels[std::size_t(y) * std::size_t(film.width) + std::size_t(x)];
-                        for (std::uint32_t s = first; s < last; ++s)
-                            pixel.add(
-                                tracer.sample(x, y, s, options.seed, options.stats && s % timed_every == 0, counts));
+                        const std::size_t index = std::size_t(y) * std::size_t(film.width) + std::size_t(x);
+                        for (std::uint32_t s = first; s < last; ++s) {
+                            const bool timed = options.stats && s % timed_every == 0;
+                            Layers layers;
+                            film.pixels[index].add(tracer.sample(x, y, s, options.seed, timed, counts,
+                                                                 film.layers.empty() ? nullptr : &layers));
+                            if (!film.layers.empty()) film.layers[index] += layers;
+                        }
                     }
                 const std::lock_guard<std::mutex> lock(mutex);
                 ++done;

@@ -1,18 +1,16 @@
 #include "render/scene.hpp"
 
-#include <cerrno>
-#include <cstring>
-#include <fstream>
-
+#include "render/creature.hpp"
 #include "render/error.hpp"
 #include "render/fields.hpp"
+#include "render/strand_file.hpp"
 
 namespace medulla::render {
 namespace {
 
 using nlohmann::json;
 
-constexpr double greatest_file = 1 << 24;
+constexpr std::uint64_t greatest_scene = 1 << 24;
 
 Camera read_camera(Fields f) {
     Camera c;
@@ -99,9 +97,51 @@ std::vector<Stop> read_along(Fields& f, const std::vector<Material>& materials, 
     return stops;
 }
 
-Layer read_layer(Fields f, const std::vector<Material>& materials, int material) {
+/// The bytes of the file that a field names, beside the scene; its fingerprint goes into scene.text.
+std::string named_file(Fields& f, const char* name, std::uint64_t most, Scene& scene, std::string& path) {
+    path = path_beside(f.file(), f.text(name, ""));
+    std::string bytes;
+    try {
+        bytes = read_file(path, most);
+    } catch (const Error& error) {
+        throw Error("{}: {}", f.place(name), error.what());
+    }
+    scene.text += fmt::format("\n{:016x}", fingerprint(bytes.data(), bytes.size()));
+    return bytes;
+}
+
+std::shared_ptr<const Texture> read_texture(Fields f, Scene& scene) {
+    Texture t;
+    t.sets =
+        static_cast<Sets>(f.choice("sets", {"sigma_ca", "colour", "kappa", "sigma_ms_factor", "sigma_ca_factor"}, 0));
+    t.mapping = static_cast<Mapping>(f.choice("map", {"planar", "around", "strand"}, 0));
+    t.scale = f.number("scale", 1, at_least_0);
+    if (t.mapping != Mapping::strand) t.origin = f.vector("origin", t.origin);
+    if (t.mapping == Mapping::planar) {
+        t.u = f.vector("u", t.u), t.v = f.vector("v", t.v);
+        if (!(dot(t.u, t.u) > 0)) throw Error("{}: expected an edge, found a vector of length 0", f.place("u"));
+        if (!(dot(t.v, t.v) > 0)) throw Error("{}: expected an edge, found a vector of length 0", f.place("v"));
+    }
+    f.has("file");
+    f.done();
+    std::string path;
+    const std::string bytes = named_file(f, "file", greatest_image_file, scene, path);
+    t.image = read_image(path, bytes, t.sets == Sets::colour);
+    return std::make_shared<const Texture>(std::move(t));
+}
+
+std::vector<std::shared_ptr<const Texture>> read_textures(Fields& f, Scene& scene) {
+    std::vector<std::shared_ptr<const Texture>> textures;
+    const json& list = f.list("textures");
+    for (std::size_t i = 0; i < list.size(); ++i)
+        textures.push_back(read_texture({list[i], f.file(), fmt::format("{}/{}", f.pointer("textures"), i)}, scene));
+    return textures;
+}
+
+Layer read_layer(Fields f, Scene& scene, int material) {
     Layer l;
-    l.along = read_along(f, materials, material);
+    l.along = read_along(f, scene.materials, material);
+    l.textures = read_textures(f, scene);
     l.colour_noise = f.number("colour_noise", 0, {0, 10});
     l.density = f.number("density", l.density, positive);
     l.length = f.number("length", l.length, positive),
@@ -121,18 +161,63 @@ Layer read_layer(Fields f, const std::vector<Material>& materials, int material)
     return l;
 }
 
+Placement read_placement(Fields& f) {
+    Placement p;
+    p.scale = f.number("scale", p.scale, positive);
+    p.up = f.choice("up", {"x", "y", "z"}, p.up);
+    p.turn = f.degrees("turn", 0, -360, 360);
+    p.translate = f.vector("translate", p.translate);
+    return p;
+}
+
+std::shared_ptr<const Mesh> read_mesh_object(Fields& f, Scene& scene) {
+    MeshFile how;
+    how.placement = read_placement(f);
+    how.clockwise = f.choice("faces", {"counter-clockwise", "clockwise"}, 0) == 1;
+    std::string path;
+    const std::string bytes = named_file(f, "file", greatest_mesh_file, scene, path);
+    return std::make_shared<const Mesh>(read_mesh(path, bytes, how));
+}
+
+std::shared_ptr<const Mesh> read_creature(Fields& f) {
+    const Placement placement = read_placement(f);
+    const float blend = f.number("blend", 0.015f, {0.001, 1e9});
+    std::vector<Ball> balls;
+    const json& list = f.list("balls");
+    if (list.size() > 1000) throw Error("{}: expected at most 1000 balls, found {}", f.place("balls"), list.size());
+    for (std::size_t i = 0; i < list.size(); ++i) {
+        const std::string place = fmt::format("{}/{}", f.place("balls"), i);
+        if (!list[i].is_array() || list[i].size() < 4 || list[i].size() > 5)
+            throw Error("{}: expected x, y, z, radius and at will the hairs' length, found {}", place, quoted(list[i]));
+        const auto number = [&](std::size_t k, Range range) {
+            return float(checked_number(list[i][k], fmt::format("{}/{}", place, k), range));
+        };
+        const Vec3 centre{number(0, any_number), number(1, any_number), number(2, any_number)};
+        balls.push_back({centre, number(3, positive), list[i].size() == 5 ? number(4, at_least_0) : 1});
+    }
+    if (f.has("balls") && balls.empty()) throw Error("{}: expected at least one ball", f.place("balls"));
+    auto mesh = std::make_shared<const Mesh>(creature(balls.empty() ? fox() : balls, blend, placement));
+    if (mesh->indices.empty()) throw Error("{}: expected balls that the grid about them can resolve", f.place("balls"));
+    return mesh;
+}
+
 /// @param coats named lists of layers, which an object may share with others
-Object read_object(Fields f, const std::vector<Material>& materials, const json& coats) {
+Object read_object(Fields f, Scene& scene, const json& coats) {
+    const std::vector<Material>& materials = scene.materials;
     Object o;
     Shape& s = o.shape;
-    s.form = static_cast<Form>(f.choice("shape", {"patch", "sphere", "torus"}, 1));
-    s.centre = f.vector("centre", s.centre);
-    if (s.form == Form::patch) {
+    s.form = static_cast<Form>(f.choice("shape", {"patch", "sphere", "torus", "mesh", "creature"}, 1));
+    if (s.form == Form::mesh) {
+        s.mesh = read_mesh_object(f, scene);
+    } else if (s.form == Form::creature) {
+        s.mesh = read_creature(f);
+    } else if (s.form == Form::patch) {
         s.width = f.number("width", 1, positive), s.depth = f.number("depth", 1, positive);
     } else {
         s.radius = f.number("radius", 1, positive);
         if (s.form == Form::torus) s.tube = f.number("tube", 0.4f * s.radius, {0, s.radius, true});
     }
+    if (s.mesh == nullptr) s.centre = f.vector("centre", s.centre);
     if (f.has("skin") && f.value("skin").is_null())
         o.has_skin = false;
     else
@@ -145,9 +230,28 @@ Object read_object(Fields f, const std::vector<Material>& materials, const json&
     const std::string pointer = named ? "/coats/" + f.text("coat", "") : f.pointer("coat");
     if (!coat.is_array()) throw Error("{}: {}: expected a list, found {}", f.file(), pointer, quoted(coat));
     for (std::size_t i = 0; i < coat.size(); ++i)
-        o.coat.push_back(read_layer({coat[i], f.file(), fmt::format("{}/{}", pointer, i)}, materials, material));
+        o.coat.push_back(read_layer({coat[i], f.file(), fmt::format("{}/{}", pointer, i)}, scene, material));
     f.done();
     return o;
+}
+
+Strands read_strand_object(Fields f, Scene& scene) {
+    StrandFile how;
+    how.placement = read_placement(f);
+    if (f.has("radius")) how.radius = f.number("radius", 0, positive);
+    how.radius_scale = f.number("radius_scale", 1, positive);
+    const std::vector<Stop> along = read_along(f, scene.materials);
+    const auto textures = read_textures(f, scene);
+    const float colour_noise = f.number("colour_noise", 0, {0, 10});
+    const auto seed = std::uint32_t(f.whole("seed", 1, 0, 2000000000));
+    f.has("strands");
+    f.done();
+    std::string path;
+    const std::string bytes = named_file(f, "strands", greatest_strand_file, scene, path);
+    Strands strands = read_strands(path, bytes, how);
+    strands.along = along, strands.textures = textures;
+    strands.colour_noise = colour_noise, strands.seed = seed;
+    return strands;
 }
 
 SingleFibre read_fibre(Fields f, const std::vector<Material>& materials) {
@@ -182,9 +286,22 @@ Vec3 direction(Fields& f, const char* name, Vec3 otherwise) {
     return normalise(v);
 }
 
-Light read_light(Fields f) {
+std::shared_ptr<const Environment> read_environment(Fields& f, Scene& scene) {
+    const float turn = f.degrees("turn", 0, -360, 360);
+    const Rgb scale = f.colour("scale", {1, 1, 1});
+    std::string path;
+    const std::string bytes = named_file(f, "file", greatest_image_file, scene, path);
+    return std::make_shared<const Environment>(read_image(path, bytes), turn, scale, path);
+}
+
+Light read_light(Fields f, Scene& scene) {
     Light l;
-    l.form = static_cast<LightForm>(f.choice("light", {"sky", "sun", "rectangle"}, 0));
+    l.form = static_cast<LightForm>(f.choice("light", {"sky", "sun", "rectangle", "environment"}, 0));
+    if (l.form == LightForm::environment) {
+        l.environment = read_environment(f, scene);
+        f.done();
+        return l;
+    }
     l.radiance = f.colour(l.form == LightForm::sun ? "irradiance" : "radiance", l.radiance);
     if (l.form == LightForm::sun) {
         l.direction = direction(f, "direction", l.direction);
@@ -223,28 +340,22 @@ Scene parse_scene(const std::string& text, const std::string& where) {
     each("materials", [&](Fields m) { scene.materials.push_back(read_material(std::move(m))); });
     const json& coats = f.has("coats") ? f.value("coats") : nothing;
     if (!coats.is_object()) throw Error("{}: expected an object, found {}", f.place("coats"), quoted(coats));
-    each("objects", [&](Fields o) { scene.objects.push_back(read_object(std::move(o), scene.materials, coats)); });
+    each("objects", [&](Fields o) {
+        if (o.has("strands"))
+            scene.strands.push_back(read_strand_object(std::move(o), scene));
+        else
+            scene.objects.push_back(read_object(std::move(o), scene, coats));
+    });
     each("fibres", [&](Fields s) { scene.fibres.push_back(read_fibre(std::move(s), scene.materials)); });
-    each("lights", [&](Fields l) { scene.lights.push_back(read_light(std::move(l))); });
+    each("lights", [&](Fields l) { scene.lights.push_back(read_light(std::move(l), scene)); });
     if (f.has("ground")) scene.ground = read_ground(part("ground"));
     f.done();
     if (scene.lights.empty()) throw Error("{}: expected at least one light, found none", f.place("lights"));
-    if (scene.objects.empty() && scene.fibres.empty())
+    if (scene.objects.empty() && scene.strands.empty() && scene.fibres.empty())
         throw Error("{}: expected at least one object or one of fibres, found none", f.place("objects"));
     return scene;
 }
 
-Scene read_scene(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw Error("{}: cannot be read: {}", path, std::strerror(errno));
-    std::string text;
-    char block[4096];
-    while (file.read(block, sizeof block), file.gcount() > 0) {
-        text.append(block, std::size_t(file.gcount()));
-        if (double(text.size()) > greatest_file) throw Error("{}: expected at most 16 MiB", path);
-    }
-    if (file.bad()) throw Error("{}: cannot be read: {}", path, std::strerror(errno));
-    return parse_scene(text, path);
-}
+Scene read_scene(const std::string& path) { return parse_scene(read_file(path, greatest_scene), path); }
 
 }  // namespace medulla::render

@@ -3,11 +3,15 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "medulla/fur_parameters.hpp"
-#include "render/vector.hpp"
+#include "render/environment.hpp"
+#include "render/mesh.hpp"
+#include "render/strands.hpp"
+#include "render/texture.hpp"
 
 namespace medulla::render {
 
@@ -29,14 +33,9 @@ struct Material {
     FurParameters<3> fur;
 };
 
-/// The material at a place along the strand; between two of them every parameter is interpolated.
-struct Stop {
-    float at;  ///< 0 root, 1 tip
-    int material;
-};
-
 struct Layer {
     std::vector<Stop> along;
+    std::vector<std::shared_ptr<const Texture>> textures;
     float colour_noise = 0;  ///< spread of sigma_ca from strand to strand: factors exp(+-colour_noise)
     float density = 1000;    ///< strands per unit of area
     float length = 0.2f, length_noise = 0.2f;  ///< noise: share of the length, even in +-
@@ -53,13 +52,14 @@ struct Layer {
     std::uint32_t seed = 1;
 };
 
-enum class Form { patch, sphere, torus };
+enum class Form { patch, sphere, torus, mesh, creature };
 
 struct Shape {
     Form form = Form::sphere;
     Vec3 centre;
-    float radius = 1, tube = 0.4f;  ///< sphere and torus (about y); the torus' tube
-    float width = 1, depth = 1;     ///< patch, in the plane y = 0, seen from above
+    float radius = 1, tube = 0.4f;     ///< sphere and torus (about y); the torus' tube
+    float width = 1, depth = 1;        ///< patch, in the plane y = 0, seen from above
+    std::shared_ptr<const Mesh> mesh;  ///< of mesh and creature, where it stands
 };
 
 struct Object {
@@ -85,7 +85,7 @@ struct Ground {
     Rgb colour{0.4f, 0.4f, 0.4f};
 };
 
-enum class LightForm { sky, sun, rectangle };
+enum class LightForm { sky, sun, rectangle, environment };
 
 struct Light {
     LightForm form = LightForm::sky;
@@ -93,6 +93,7 @@ struct Light {
     Vec3 direction{0, 1, 0};      ///< sun: towards it
     float angle = 0.0046f;        ///< sun: half its angular diameter [radians]
     Vec3 corner, edge_a, edge_b;  ///< rectangle: lit on the side of cross(edge_a, edge_b)
+    std::shared_ptr<const Environment> environment;
 };
 
 struct Scene {
@@ -100,10 +101,11 @@ struct Scene {
     Picture picture;
     std::vector<Material> materials;
     std::vector<Object> objects;
+    std::vector<Strands> strands;  ///< from files
     std::vector<SingleFibre> fibres;
     Ground ground;
     std::vector<Light> lights;
-    std::string text;  ///< the file, to tell whether a picture that goes on is of the same scene
+    std::string text;  ///< the file and fingerprints of those it names, to tell whether a picture that goes on is of it
 };
 
 /// Throws Error: one line with file, field, expected and found.

@@ -12,6 +12,7 @@
 #include "render/groom.hpp"
 #include "render/path.hpp"
 #include "render/scene.hpp"
+#include "render/texture.hpp"
 
 namespace medulla::render {
 
@@ -24,6 +25,8 @@ struct FibreHit {
     float footprint;    ///< diameter of the path's cone [fibre radii]
     float along;        ///< [0, 1] from root to tip
     float colour;       ///< factor of sigma_ca
+    Vec3 root;          ///< where the strand begins, in the world
+    float column = 0;   ///< [0, 1) by strand, for textures
 };
 
 /// A fibre's field with its frame in the world.
@@ -34,6 +37,11 @@ struct FieldInWorld {
 
     Evaluation<3> evaluate(Vec3 drawn) const { return field.evaluate(local(basis, drawn)); }
     Sample<3> sample(RandomNumbers u) const { return field.sample(u); }
+    /// The value of one lobe alone.
+    Vec3 lobe(Lobe k, Vec3 drawn) const {
+        const Colour<3> c = field.keep(lobe_bit(k)).value(local(basis, drawn));
+        return {c[0], c[1], c[2]};
+    }
     Vec3 world(Vector w) const { return basis.to_world({w.x, w.y, w.z}); }
     static Vector local(const Basis& basis, Vec3 w) {
         const Vec3 v = basis.to_local(w);
@@ -47,22 +55,35 @@ class Shading {
   public:
     Shading(const Scene& scene, const std::vector<Strands>& layers, LobeMask lobes) : lobes_(lobes) {
         const PackView pack = default_pack();
-        for (const Strands& layer : layers) coats_.push_back(make_coat(scene.materials, layer.along, pack));
+        for (const Strands& layer : layers) coats_.push_back(make_coat(scene.materials, layer, pack));
     }
 
-    /// Calls use(field in world) for the fibre at a hit.
+    /// Share of the light that leaves the fibre again, of a ray that meets it at the hit's offset.
+    Rgb albedo(const FibreHit& hit) const {
+        const Basis basis = basis_about(hit.tangent);
+        const Vector known = FieldInWorld<int>::local(basis, hit.known);
+        const NearField<3> field =
+            near_field(fibre(hit), known, offset_of(known, FieldInWorld<int>::local(basis, hit.point)));
+        return rgb(lobes_ == all_lobes ? field.albedo() : field.keep(lobes_).albedo());
+    }
+
+    /// Calls use(field in world) for the fibre at a hit; whether its parameters were clamped to their ranges.
     template <class Use>
-    void at(const FibreHit& hit, FieldChoice choice, Use&& use) const {
+    bool at(const FibreHit& hit, FieldChoice choice, Use&& use) const {
         const Basis basis = basis_about(hit.tangent);
         const Vector known = FieldInWorld<int>::local(basis, hit.known);
         const float h = offset_of(known, FieldInWorld<int>::local(basis, hit.point));
-        const Coat& coat = coats_[hit.layer];
-        const Fibre<3> fibre = coat.stops.size() == 1 && hit.colour == 1 ? coat.first : fibre_at(coat, hit);
+        const Fibre<3> fibre = this->fibre(hit);
         const bool one_offset = choice == FieldChoice::one_offset ||
                                 (choice == FieldChoice::multiscale && hit.footprint < narrow_footprint);
-        if (one_offset) return with_lobes(basis, near_field(fibre, known, h), use);
-        const Offsets offsets = choice == FieldChoice::multiscale ? pixel_coverage(h, hit.footprint, 1, 1) : Offsets{};
-        with_lobes(basis, far_field(fibre, known, offsets), use);
+        if (one_offset) {
+            with_lobes(basis, near_field(fibre, known, h), use);
+        } else {
+            const bool covered = choice == FieldChoice::multiscale;
+            const Offsets offsets = covered ? pixel_coverage(h, hit.footprint, 1, 1) : Offsets{};
+            with_lobes(basis, far_field(fibre, known, offsets), use);
+        }
+        return fibre.status == FibreStatus::clamped_parameters;
     }
 
   private:
@@ -78,6 +99,7 @@ class Shading {
     };
     struct Coat {
         std::vector<ParametersAt> stops;
+        std::vector<std::shared_ptr<const Texture>> textures;
         std::unique_ptr<void, Free> memory;
         const DenseTables* tables = nullptr;
         Fibre<3> first;
@@ -88,10 +110,11 @@ class Shading {
         use(FieldInWorld<Field>{basis, lobes_ == all_lobes ? field : field.keep(lobes_)});
     }
 
-    /// Tables over all that materials between the stops can ask for: the ends of each parameter's range.
-    static Coat make_coat(const std::vector<Material>& materials, const std::vector<Stop>& along,
-                          const PackView& pack) {
+    /// Tables over all that materials between the stops, and textures, can ask for: the ends of each parameter's range.
+    static Coat make_coat(const std::vector<Material>& materials, const Strands& layer, const PackView& pack) {
+        const std::vector<Stop>& along = layer.along;
         Coat coat;
+        coat.textures = layer.textures;
         for (const Stop& stop : along) coat.stops.push_back({stop.at, materials[std::size_t(stop.material)].fur});
         FurParameters<3> low = coat.stops[0].fur, high = low;
         for (const ParametersAt& stop : coat.stops) {
@@ -100,6 +123,15 @@ class Shading {
             low.kappa = std::min(low.kappa, p.kappa), high.kappa = std::max(high.kappa, p.kappa);
             low.g = std::min(low.g, p.g), high.g = std::max(high.g, p.g);
             high.eta = std::min(high.eta, p.eta);
+        }
+        for (const auto& texture : coat.textures) {
+            float least, most;
+            range_of(*texture, least, most);
+            if (texture->sets == Sets::kappa)
+                low.kappa = std::min(low.kappa, std::max(0.0f, least)),
+                high.kappa = std::max(high.kappa, std::min(1.0f, most));
+            if (texture->sets == Sets::sigma_ms_factor)
+                low.sigma_ms *= std::clamp(least, 0.0f, 1.0f), high.sigma_ms *= std::max(1.0f, most);
         }
         const TableRanges ranges = join(ranges_of(low), ranges_of(high));
         const std::size_t bytes = (tables_bytes(pack, ranges) + 63) / 64 * 64;
@@ -117,6 +149,12 @@ class Shading {
         return coat;
     }
 
+    Fibre<3> fibre(const FibreHit& hit) const {
+        const Coat& coat = coats_[hit.layer];
+        const bool even = coat.stops.size() == 1 && hit.colour == 1 && coat.textures.empty();
+        return even ? coat.first : fibre_at(coat, hit);
+    }
+
     /// All parameters interpolated between the two stops about the hit.
     static Fibre<3> fibre_at(const Coat& coat, const FibreHit& hit) {
         std::size_t next = 0;
@@ -132,8 +170,23 @@ class Shading {
                 p.*x = mix(p.*x, q.*x, t);
             for (int c = 0; c < 3; ++c) p.sigma_ca[c] = mix(p.sigma_ca[c], q.sigma_ca[c], t);
         }
+        for (const auto& texture : coat.textures) set(p, texture->sets, texture->at(hit.root, hit.along, hit.column));
         for (float& sigma : p.sigma_ca) sigma *= hit.colour;
         return make_fibre(p, coat.tables, OutOfRange::clamp);
+    }
+
+    static void set(FurParameters<3>& p, Sets what, Rgb value) {
+        const float channel[3] = {value.x, value.y, value.z};
+        // A colour is what a ray through the axis keeps, over two radii; comparisons that let what is no number
+        // through.
+        const auto absorption = [](float c) { return -0.5f * std::log(c < 1e-3f ? 1e-3f : c > 1 ? 1 : c); };
+        for (int c = 0; c < 3; ++c) {
+            if (what == Sets::sigma_ca) p.sigma_ca[c] = channel[c];
+            if (what == Sets::sigma_ca_factor) p.sigma_ca[c] *= channel[c];
+            if (what == Sets::colour) p.sigma_ca[c] = absorption(channel[c]);
+        }
+        if (what == Sets::kappa) p.kappa = value.x;
+        if (what == Sets::sigma_ms_factor) p.sigma_ms *= value.x;
     }
 
     LobeMask lobes_;

@@ -43,11 +43,15 @@ float area_of(const Shape& s) {
             return 4 * pi_f * s.radius * s.radius;
         case Form::torus:
             return 4 * pi_f * pi_f * s.radius * s.tube;
+        case Form::mesh:
+        case Form::creature:
+            return float(s.mesh->area.back());
     }
     return 0;
 }
 
 SurfacePoint sample_surface(const Shape& s, Sequence& random) {
+    if (s.mesh != nullptr) return sample_surface(*s.mesh, random);
     const float u = random(), v = random();
     if (s.form == Form::patch) return {s.centre + Vec3{(u - 0.5f) * s.width, 0, (v - 0.5f) * s.depth}, {0, 1, 0}};
     if (s.form == Form::sphere) return on_sphere(s, u, v);
@@ -67,6 +71,12 @@ Mesh mesh_of(const Shape& s, Rgb albedo) {
                 const float half = std::sin(0.5f * pi_f * v);
                 return on_sphere(s, u, half * half);
             });
+        case Form::mesh:
+        case Form::creature: {
+            Mesh mesh = *s.mesh;
+            mesh.albedo = albedo;
+            return mesh;
+        }
         case Form::torus:
             break;
     }

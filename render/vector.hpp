@@ -26,6 +26,7 @@ inline Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a
 inline float length(Vec3 a) { return std::sqrt(dot(a, a)); }
 inline Vec3 normalise(Vec3 a) { return (1 / length(a)) * a; }
 inline float greatest(Vec3 a) { return std::max(a.x, std::max(a.y, a.z)); }
+inline float greatest_size(Vec3 a) { return std::max(std::abs(a.x), std::max(std::abs(a.y), std::abs(a.z))); }
 inline float luminance(Rgb c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }  // Rec. 709
 inline bool finite(Vec3 a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }
 inline Vec3 mix(Vec3 a, Vec3 b, float t) { return (1 - t) * a + t * b; }

@@ -63,7 +63,7 @@ class FurRender(unittest.TestCase):
         for words in ([], ["patch.json"], ["patch.json", "-o", "x.jpg"], ["patch.json", "-o", "x.png", "--spp", 0],
                       ["patch.json", "-o", "x.png", "--field", "middle"], ["patch.json", "-o", "x.png", "--error", "-1"],
                       ["patch.json", "-o", "x.png", "--lobes", "R,TTT"], ["patch.json", "-o", "x.png", "-o", "y.gif"],
-                      ["patch.json", "-o", "x.png", ""], ["patch.json", "-o", "x.png", "--nonsense"]):
+                      ["patch.json", "-o", "x.png", "--layers"], ["patch.json", "-o", "x.png", ""], ["patch.json", "-o", "x.png", "--nonsense"]):
             self.fails(2, *words)
         self.fails(1, "absent.json", "-o", "x.png", names=["absent.json", "No such file"])
         self.fails(1, ".", "-o", "x.png", names=[".: "])
@@ -115,10 +115,13 @@ class FurRender(unittest.TestCase):
         self.assertEqual((code, err), (0, ""))
         self.assertGreaterEqual(json.loads(out)["seconds"], 0.2)
         self.assertEqual(bytes_of(self.path("x.exr"))[:4], b"\x76\x2f\x31\x01")
+        self.assertNotIn(b"lobe_TT.R", bytes_of(self.path("x.exr")))
+        self.assertEqual(run("patch.json", "-o", "x.exr", "--layers", "--spp", 1, *SMALL, cwd=self.cwd)[0], 0)
+        self.assertIn(b"lobe_TT.R", bytes_of(self.path("x.exr")))
 
     def test_scenes_that_ship(self):
         """Each is one that the program takes; the furnace's mean is 1 to 5 standard errors of the picture's mean."""
-        for name in sorted(os.listdir(SCENES)):
+        for name in sorted(name for name in os.listdir(SCENES) if name.endswith(".json")):
             code, out, err = run(os.path.join(SCENES, name), "-o", "x.png", "--spp", 16 if name == "furnace.json" else 1,
                                  "--json", "--density", 1 if name == "furnace.json" else 0.02, *SMALL, cwd=self.cwd)
             self.assertEqual((code, err), (0, ""), name)

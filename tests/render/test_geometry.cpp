@@ -61,7 +61,7 @@ TEST_CASE("a path that leaves a strand does not meet it where it leaves", "[rend
     Sequence random(2);
     int left = 0;
     for (int i = 0; i < 2000; ++i) {
-        const Vec3 from = 3.0f * on_sphere(random), to{0.08f * random(), random.even(), 0.02f * random.even()};
+        const Vec3 from = 3.0f * on_sphere(random), to{0.06f + 0.06f * random(), random.even(), 0.02f * random.even()};
         const Ray ray{from, normalise(to - from), {}};
         const Hit hit = geometry.nearest(ray);
         if (!hit) continue;

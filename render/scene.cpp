@@ -99,7 +99,9 @@ std::vector<Stop> read_along(Fields& f, const std::vector<Material>& materials, 
 
 /// The bytes of the file that a field names, beside the scene; its fingerprint goes into scene.text.
 std::string named_file(Fields& f, const char* name, std::uint64_t most, Scene& scene, std::string& path) {
-    path = path_beside(f.file(), f.text(name, ""));
+    const std::string named = f.text(name, "");
+    if (named.empty()) throw Error("{}: expected the name of a file, found none", f.place(name));
+    path = path_beside(f.file(), named);
     std::string bytes;
     try {
         bytes = read_file(path, most);

@@ -175,7 +175,7 @@ TEST_CASE("textures of a scene are read, and refused in one line", "[render][tex
         std::string texture;
         std::vector<std::string> says;
     } cases[] = {
-        {"{}", {"/textures/0/file"}},
+        {"{}", {"/textures/0/file", "name of a file", "found none"}},
         {R"({"file": "none.png"})", {"/textures/0/file", "none.png", "No such file"}},
         {R"({"file": "a.jpg"})", {"a.jpg"}},
         {"{" + file + R"(, "sets": "beta_m"})",

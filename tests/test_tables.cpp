@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "medulla/lookup.hpp"
 #include "tables/error.hpp"
 #include "tables/job/simulate.hpp"
 #include "tables/pack/source.hpp"
@@ -58,6 +59,18 @@ TEST_CASE("Axes that begin at -0 and at 0 are the same job, values and bytes", "
     }
     for (const double end : {parse_range("-0:1", "--g-range", 3).low, parse_range("-1:-0", "--g-range", 3).high})
         CHECK_FALSE(std::signbit(end));
+}
+
+TEST_CASE("At 90 degrees the slab's closed form is what its solvers have: all light is scattered, however thin it is",
+          "[tables]") {
+    for (const double sigma : {1e-300, 1e-17, 1.0, 1e3}) CHECK(longitudinal_energy(sigma, pi / 2) == 1);
+    for (const float sigma : {1e-30f, 1.0f}) {
+        CHECK(longitudinal_energy(sigma, float(pi / 2)) == 1);  // beyond pi/2, where its cosine is negative
+        CHECK(longitudinal_energy(sigma, -float(pi / 2)) == 1);
+    }
+    CHECK(longitudinal_energy(0.0, pi / 2) == 0);
+    CHECK(std::isnan(longitudinal_energy(1.0, std::nan(""))));
+    CHECK(longitudinal_energy(0.5, 1.0) == Approx(1 - std::exp(-1 / std::cos(1.0))));
 }
 
 TEST_CASE("A cell's values do not depend on the table around it", "[tables]") {

@@ -23,7 +23,8 @@ void check(double sigma, double g, std::size_t bins, const TraceOptions& options
 }
 
 /// Free flight with collision density sigma exp(-sigma t); infinite for sigma = 0.
-double free_flight(double sigma, RandomStream& random) { return -portable::log(random.uniform()) / sigma; }
+/// sigma + 0 turns -0 into 0: the flight is then infinite, and not backwards.
+double free_flight(double sigma, RandomStream& random) { return -portable::log(random.uniform()) / (sigma + 0.0); }
 
 /// First flight, conditioned on a collision within `length`: t = -log(1 - u (1 - exp(-sigma L))) / sigma -> u L.
 double forced_flight(double sigma, double length, RandomStream& random) {

@@ -194,8 +194,16 @@ Tables plan_of(const Request& request) {
     return plan;
 }
 
+/// The request with 0 in place of -0: a solver that divides by sigma = -0 would fly backwards for ever.
+Request without_negative_zeros(Request request) {
+    for (Axis* axis : {&request.sigma, &request.g, &request.h, &request.theta_i, &request.absorption})
+        for (double& value : axis->values) value += 0.0;
+    return request;
+}
+
 struct SliceSolver::State {
-    explicit State(const Request& wanted) : request(wanted), plan(plan_of(request)), slabs(request.g.values) {}
+    explicit State(const Request& wanted)
+        : request(without_negative_zeros(wanted)), plan(plan_of(request)), slabs(request.g.values) {}
 
     const Request request;
     const Tables plan;

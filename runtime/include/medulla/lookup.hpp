@@ -205,7 +205,10 @@ MEDULLA_FN T azimuthal_energy(T sigma, T h) noexcept {
 /// 1 - exp(-2 sigma / cos theta_i): energy that the slab scatters, both sides together (physics.md, section 3).
 template <class T>
 MEDULLA_FN T longitudinal_energy(T sigma, T theta_i) noexcept {
-    return -std::expm1(T(-2) * sigma / std::cos(theta_i));
+    // The number next to pi/2 stands for 90 degrees, where any scatterer is met; its own cosine is 6e-17, or below 0.
+    const T inclined = theta_i < T(0) ? -theta_i : theta_i;
+    if (inclined >= T(pi / 2)) return sigma > T(0) ? T(1) : sigma;  // a NaN goes on
+    return -std::expm1(T(-2) * sigma / std::cos(inclined));
 }
 
 /// Whether a pack knows what absorption leaves: its azimuthal table has that axis, and the lengths stand beside it.

@@ -7,11 +7,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <memory>
 #include <random>
 
 #include "medulla/colour.hpp"
 #include "medulla/medulla.hpp"
+#include "tests/support/fibre_of.hpp"
 
 using namespace medulla;
 
@@ -122,12 +122,7 @@ int main(int argc, char** argv) {
     int rows = 0;
     for (const FurPreset& preset : fur_presets) {
         FurParameters<1> p = parameters_of<1>(preset);
-        const TableRanges ranges = ranges_of(p);
-        std::size_t bytes = tables_bytes(default_pack(), ranges), room = bytes + 64;
-        const std::unique_ptr<char[]> memory(new char[room]);
-        void* aligned = memory.get();
-        std::align(64, bytes, aligned, room);
-        const DenseTables* tables = make_tables(default_pack(), ranges, aligned, bytes).tables;
+        const test::OwnedTables tables(default_pack(), ranges_of(p));
         for (const float wanted : {0.05f, 0.1f, 0.2f, 0.3f, 0.45f, 0.6f, 0.75f, 0.9f}) {
             const float colour[1] = {wanted};
             const SigmaOfColour<1> answer = sigma_ca_of_fur_colour(p, colour);
@@ -136,7 +131,7 @@ int main(int argc, char** argv) {
                 continue;
             }
             p.sigma_ca[0] = answer.sigma_ca[0];
-            const Fibre<1> fibre = make_fibre(p, tables);
+            const Fibre<1> fibre = make_fibre(p, tables.get());
             const Mean all = coat_albedo(fibre, Coat::all_directions, relative_error);
             const double difference = all.value / double(wanted) - 1;
             worst = std::max(worst, std::abs(difference)), squares += difference * difference, ++rows;

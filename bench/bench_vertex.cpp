@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -15,6 +14,7 @@
 #include "chiang_hair.hpp"
 #include "medulla/medulla.hpp"
 #include "nvcc_figures.hpp"
+#include "tests/support/fibre_of.hpp"
 #include "tests/support/fur_reference.hpp"
 #include "vertex_timing.hpp"
 
@@ -68,25 +68,6 @@ std::vector<PathHit> random_hits() {
     }
     return hits;
 }
-
-/// DenseTables in memory of their own.
-class OwnedTables {
-  public:
-    explicit OwnedTables(const TableRanges& ranges) {
-        std::size_t bytes = tables_bytes(default_pack(), ranges), room = bytes + 64;
-        memory_.reset(new char[room]);
-        void* aligned = memory_.get();
-        std::align(64, bytes, aligned, room);
-        const TablesResult made = make_tables(default_pack(), ranges, aligned, bytes);
-        if (made.status != TablesStatus::ok) std::fprintf(stderr, "%s\n", describe(made.status)), std::exit(1);
-        tables_ = made.tables;
-    }
-    const DenseTables* get() const { return tables_; }
-
-  private:
-    std::unique_ptr<char[]> memory_;
-    const DenseTables* tables_ = nullptr;
-};
 
 /// The vertex of any field.
 template <class Field>
@@ -199,7 +180,9 @@ int main(int argc, char** argv) {
     const std::vector<PathHit> hits = random_hits();
     TableRanges ranges = ranges_of(hits[0].coat), wide = ranges;
     for (const PathHit& hit : hits) wide = join(wide, ranges_of(hit.textured_medulla));
-    const OwnedTables one(ranges), textured(wide);
+    const test::OwnedTables one(default_pack(), ranges), textured(default_pack(), wide);
+    for (const test::OwnedTables* tables : {&one, &textured})
+        if (tables->status() != TablesStatus::ok) return std::fprintf(stderr, "%s\n", describe(tables->status())), 1;
     const Fibre<3> coat = make_fibre(hits[0].coat, one.get());
     const auto near_row = [&hits](FurParameters<3> PathHit::*parameters, const DenseTables* tables) {
         return [&hits, parameters, tables](int i) {

@@ -58,7 +58,7 @@ class Outsiders(runs.WithFiles):
         bcsdf = ["bcsdf", "--preset", "cat", "--theta-i", 1, "--theta-r", 1, "--phi", 1]
         compress = ["compress", "t.h5", "-o", "new.furpack"]
         real = {"furtable": [(compress, "--max-error"), (query, "--sigma"), (query, "--g"), (query, "--h"), (slab, "--theta"),
-                             (query, "--absorption"), (["verify", "t.furpack"], "--max-dip"), ([*bcsdf, "--far"], "--theta-i"),
+                             (query, "--absorption"), (["verify", "t.furpack"], "--max-undershoot"), ([*bcsdf, "--far"], "--theta-i"),
                              ([*bcsdf, "--far"], "--theta-r"), ([*bcsdf, "--far"], "--phi"), (bcsdf, "--h")],
                 "medulla-precompute": [(["-o", "new.h5"], "--target-error"), (["-o", "new.h5"], "--time-budget")]}
         whole = {"furtable": [(compress, "--rank"), (compress, "--max-bytes"), (compress, "--seed"), (compress, "--sweeps"),

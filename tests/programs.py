@@ -90,7 +90,7 @@ class Programs(unittest.TestCase):
         text = " ".join(run("medulla-precompute", "--help")[1].split())
         self.assertIn("relative L2 error of 0.001", text)
         self.assertIn("padded with zeros to a multiple of 8", run("furtable", "compress", "--help")[1])
-        self.assertRegex(run("furtable", "verify", "--help")[1], r"(?s)--max-dip FLOAT.*4 times the\s+error.*at\s+most 0\.5")
+        self.assertRegex(run("furtable", "verify", "--help")[1], r"(?s)--max-undershoot FLOAT.*6 times the\s+error.*at\s+most 0\.5")
         info = run("furtable", "info", self.path("t.h5"))[1]
         self.assertIn("method auto: without paths, or with 2000", info)
         file = self.path("exact.h5")
@@ -146,13 +146,13 @@ class Programs(unittest.TestCase):
         self.assertEqual(list(entries), files)
         self.assertEqual([entry["ok"] for entry in entries.values()], [False, True, False, True])
         for file, entry in entries.items():
-            self.assertEqual(list(entry), ["ok", "error", "cells", "energy_error", "dip", "degeneracy"])
+            self.assertEqual(list(entry), ["ok", "error", "cells", "energy_error", "undershoot", "degeneracy"])
             self.assertEqual(entry["error"] is None, entry["ok"])
             if not entry["ok"]:
                 self.assertIn(file, entry["error"])
-        found = entries[files[3]]["dip"]
-        self.assertEqual(run("furtable", "verify", files[3], "--max-dip", 1.01 * found)[0], 0)
-        self.fails(1, "furtable", "verify", files[3], "--max-dip", 0.99 * found, names=["integral 1"])
+        found = entries[files[3]]["undershoot"]
+        self.assertEqual(run("furtable", "verify", files[3], "--max-undershoot", 1.01 * found)[0], 0)
+        self.fails(1, "furtable", "verify", files[3], "--max-undershoot", 0.99 * found, names=["integral 1"])
 
     def test_target_error(self):
         coarse = SMALL[:-4] + ["--progress", "none", "--json", "--target-error", "0.05"]

@@ -116,8 +116,9 @@ TEST_CASE("dense tables say what the factors say, over ranges of any width", "[b
     }
     for (const Width& width : widths) {
         std::printf("dense tables over %-10s against factors, relative L2 at worst: %.1e\n", width.name, width.worst);
-        // Over a coat's ranges a seventh of the pack's own error (2e-3, docs/accuracy.md), elsewhere half of it.
-        CHECK(width.worst < (width.g < 0.2f ? 3e-4 : 1e-3));
+        // The aims: 1e-4 of one material, 3e-4 over the ranges of one or of a coat; elsewhere half of the pack's own
+        // error (2e-3, docs/accuracy.md).
+        CHECK(width.worst < (width.g > 0.2f ? 1e-3 : (&width == widths ? 1e-4 : 3e-4)));
     }
 }
 

@@ -86,7 +86,7 @@ TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
         p.sigma_ms = in.mostly(0, 10), p.sigma_ma = in.mostly(0, 3), p.g = in.mostly(-0.95f, 0.95f);
         for (float& s : p.sigma_ca) s = in.mostly(0, 5);
         p.fresnel = in.uniform() < 0.5f ? Fresnel::bravais : Fresnel::exact;
-        // DenseTables of any ranges, which may be refused; those of everything; none.
+        // Tables of any ranges, which may be refused; those of everything; none.
         const test::OwnedTables own(
             pack.view, i % 8 == 1 ? TableRanges{in.any(-1, 0), in.any(0, 1), in.any(0, 4), in.any(4, 16), in.any(0, 1)}
                                   : TableRanges{0, 0, 1, 1, 0});

@@ -322,15 +322,15 @@ TEST_CASE("slab agrees with adding-doubling", "[slab]") {
         const SlabSolver solver(g);
         for (double sigma : {0.05, 1.0, 16.0}) {
             const std::size_t n = 64;
-            const SlabDoubling twin = slab_doubling(sigma, g, n);
-            const auto raw = solver.raw(sigma, twin.theta, twin.theta);
+            const SlabDoubling doubled = slab_doubling(sigma, g, n);
+            const auto raw = solver.raw(sigma, doubled.theta, doubled.theta);
             double worst = 0;
             for (std::size_t i = 0; i < n; ++i) {
                 for (std::size_t r = 0; r < n; ++r) {
-                    if (std::abs(twin.theta[i]) > 1.3 || std::abs(twin.theta[r]) > 1.3) continue;
-                    worst = std::max(worst, std::abs(twin.back[i * n + r] / raw[i][r].back - 1));
+                    if (std::abs(doubled.theta[i]) > 1.3 || std::abs(doubled.theta[r]) > 1.3) continue;
+                    worst = std::max(worst, std::abs(doubled.back[i * n + r] / raw[i][r].back - 1));
                     if (i + r != n - 1)
-                        worst = std::max(worst, std::abs(twin.forward[i * n + r] / raw[i][r].forward - 1));
+                        worst = std::max(worst, std::abs(doubled.forward[i * n + r] / raw[i][r].forward - 1));
                 }
             }
             INFO("g " << g << " sigma " << sigma);

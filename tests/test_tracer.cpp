@@ -49,7 +49,7 @@ Moments moments(const std::vector<double>& v) {
 }
 
 /// p-value of an analog lobe of n paths, taking the fast one as exact.
-double twin_p(const std::vector<double>& analog, const std::vector<double>& fast, double width, double n) {
+double analog_p(const std::vector<double>& analog, const std::vector<double>& fast, double width, double n) {
     std::vector<double> counts, probability;
     for (std::size_t i = 0; i < fast.size(); ++i)
         counts.push_back(analog[i] * width * n), probability.push_back(fast[i] * width);
@@ -82,7 +82,7 @@ TEST_CASE("Fast and analog tracer agree on both tables", "[tracer]") {
             const Profile a = trace_disc(sigma, g, h, 48, slow);
             const Profile b = trace_expected_disc(sigma, g, h, 48, options(65536)).profile;
             INFO("sigma " << sigma << " g " << g);
-            CHECK(twin_p(a.lobe, b.lobe, 2 * pi / 48, n) > 1e-5);
+            CHECK(analog_p(a.lobe, b.lobe, 2 * pi / 48, n) > 1e-5);
             CHECK(a.energy == Approx(b.energy).epsilon(1e-12));
             // 5 standard errors of a path length whose standard deviation is below three times its mean.
             CHECK(std::abs(a.mean_length - b.mean_length) < 15 * b.mean_length / std::sqrt(n));
@@ -93,7 +93,7 @@ TEST_CASE("Fast and analog tracer agree on both tables", "[tracer]") {
                 const Profile &x = back ? c.back : c.forward, &y = back ? d.back : d.forward;
                 const double here = n * x.energy / (c.back.energy + c.forward.energy);
                 INFO("back " << back);
-                CHECK(twin_p(x.lobe, y.lobe, pi / 24, here) > 1e-5);
+                CHECK(analog_p(x.lobe, y.lobe, pi / 24, here) > 1e-5);
                 CHECK(std::abs(x.energy - y.energy) < 5 * std::hypot(x.energy_error, y.energy_error));
                 CHECK(std::abs(x.mean_length - y.mean_length) < 15 * y.mean_length / std::sqrt(here));
             }

@@ -61,7 +61,7 @@ void warn_beyond_axes(const FurParameters<3>& p, double theta_i, double offset, 
             fmt::format("warning: {}: {}: TTs and TRTs are evaluated at the end of the axis", path, beyond));
 }
 
-/// Dense tables in memory of their own; empty for a fibre that does not scatter.
+/// Dense tables with their memory; empty for a fibre that does not scatter.
 struct OwnedTables {
     std::unique_ptr<void, decltype(&std::free)> memory{nullptr, &std::free};
     const DenseTables* view = nullptr;

@@ -319,7 +319,7 @@ void run_verify(const VerifyArguments& args) {
             {"error", error ? nlohmann::ordered_json(json_name(*error)) : nlohmann::ordered_json(nullptr)},
             {"cells", or_null(found.cells)},
             {"energy_error", or_null(found.energy_error)},
-            {"dip", or_null(found.undershoot)},
+            {"undershoot", or_null(found.undershoot)},
             {"degeneracy", degeneracy}};
         if (args.json || error) continue;
         if (found.cells)
@@ -356,10 +356,11 @@ void add_verify(CLI::App& app, Action& action) {
         [](CLI::App& command, VerifyArguments& args) {
             command.add_option("FILE", args.files, "tables files and packs; all are checked, also after a bad one")
                 ->required();
-            add_number(command, "--max-dip", args.max_undershoot,
-                       "limit of a pack's negative undershoot: the integral that clamping lobes to 0 adds (default: 4 "
-                       "times the error that the pack states for the kind, at most 0.5). `diff` measures the accuracy "
-                       "of a pack",
+            add_number(command, "--max-undershoot", args.max_undershoot,
+                       fmt::format("limit of a pack's negative undershoot: the integral that clamping lobes to 0 adds "
+                                   "(default: {:g} times the error that the pack states for the kind, at most {:g}). "
+                                   "`diff` measures the accuracy of a pack",
+                                   undershoot_per_error, most_undershoot),
                        {0, std::numeric_limits<double>::max()});
             command.add_flag("--json", args.json, "print one JSON object: an entry with the same keys for every file");
         },

@@ -127,7 +127,7 @@ void check(Make&& make) {
     }
 }
 
-/// DenseTables of a material in memory of their own.
+/// Tables of a material in memory of their own.
 class OwnedTables {
   public:
     explicit OwnedTables(const medulla::FurParameters<3>& p) {

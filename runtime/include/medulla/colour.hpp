@@ -1,6 +1,6 @@
 // From pigments, from physical units and from a wanted colour to the absorption of the cortex.
 // Rests on detail/cross_section.hpp: the energies of the lobes say how bright a fibre is, medulla and surface counted;
-// docs/bcsdf.md, 'Colour', derives the albedo of a coat, and bench_coat_colour measures how far it is off.
+// docs/integrations.md, 'Colour', derives the albedo of a coat, and bench_coat_colour measures its error.
 #pragma once
 
 #include "medulla/config.hpp"

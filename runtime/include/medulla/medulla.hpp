@@ -1,19 +1,20 @@
 // medulla: light in a fur fibre, for any renderer. The only header to include: C++17, the standard library alone, no
 // allocation, no exceptions, no globals with constructors; every function is pure and safe to call from any thread.
 //
-//   const PackView pack = default_pack();                         once per program; open_pack(bytes, count) for others
-//   const TableRanges ranges = ranges_of(parameters);             once per coat; join(a, b) covers two materials
-//   const std::size_t bytes = tables_bytes(pack, ranges);
-//   const DenseTables* tables = make_tables(pack, ranges, memory, bytes).tables;   memory of yours, aligned to 64 bytes
+//   const PackView pack = default_pack();                    // once per program; open_pack(bytes, count) for others
+//   const TableRanges ranges = ranges_of(parameters);        // once per coat; join(a, b) covers two materials
+//   const std::size_t bytes = tables_bytes(pack, ranges);    // memory of yours, aligned to 64 bytes
+//   const DenseTables* tables = make_tables(pack, ranges, memory, bytes).tables;
 //
-//   const Fibre<3> fibre = make_fibre(parameters, tables);        at a hit, or once: 13 numbers, textured or not
-//   const NearField<3> hit = near_field(fibre, known, h);         a ray that meets the fibre at offset h
-//   const FarField<3> hit = far_field(fibre, known);              the whole width; far_field(fibre, known, Offsets{a,
-//   b}) hit.value(drawn)       energy per steradian: multiplies the light of `drawn` as it is, no cosine is left to add
-//   hit.pdf(drawn)         density of sample(), per steradian
-//   hit.evaluate(drawn)    both, at the price of one
-//   hit.sample(numbers)    a direction with its value, pdf and weight = value / pdf
-//   hit.keep(lobe_bit(Lobe::R))   the same hit with some of the lobes
+//   const Fibre<3> fibre = make_fibre(parameters, tables);   // at a hit, or once: 13 numbers, textured or not
+//   const NearField<3> hit = near_field(fibre, known, h);    // a ray that meets the fibre at offset h
+//   const FarField<3> hit = far_field(fibre, known);         // the mean over its width, or over Offsets{a, b}
+//
+//   hit.value(drawn)              // energy per steradian: multiplies the light of `drawn` as it is, without a cosine
+//   hit.pdf(drawn)                // density of sample(), per steradian
+//   hit.evaluate(drawn)           // both, at the price of one
+//   hit.sample(numbers)           // a direction with its value, pdf and weight = value / pdf
+//   hit.keep(lobe_bit(Lobe::R))   // the same hit with some of the lobes
 //
 // Frame. `known` is the direction that the renderer has (the camera ray's in a path tracer), `drawn` the other one.
 // Both point away from the fibre, in its own frame: x along the fibre from ROOT to TIP, (y, z) across it. h =

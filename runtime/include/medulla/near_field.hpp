@@ -380,9 +380,10 @@ MEDULLA_HOT NearField<Channels> make_near(const Fibre<Channels>& fibre, const Po
 
 }  // namespace detail
 
-/// A hit at offset h. @param known direction, away from the fibre  @param h [fibre radii], as offset_of gives it;
-/// clamped to [-1, 1], beyond which rounding may put it A direction along the fibre, or a NaN, gives a hit that is
-/// black.
+/// A hit at offset h.
+/// @param known direction, away from the fibre
+/// @param h [fibre radii], as offset_of gives it; clamped to [-1, 1], beyond which rounding may put it
+/// @return a black hit for a direction along the fibre, or a NaN
 template <int Channels>
 MEDULLA_FN NearField<Channels> near_field(const Fibre<Channels>& fibre, Vector known, float h) noexcept {
     return detail::run_fused([&] { return detail::make_near(fibre, detail::polar_of(known), h); });

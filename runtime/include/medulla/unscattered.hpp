@@ -22,7 +22,7 @@ struct UnscatteredLobes {
     T N[3][std::size_t(Channels)];  ///< azimuthal density times energy [1 / radian]
 };
 
-/// @param p inside the ranges of FurParameters (check() says so for float)
+/// @param p inside the ranges of FurParameters (out_of_range() tests those of float)
 /// @param theta_i, theta_r [radians], in (-pi/2, pi/2)  @param phi [radians]  @param h offset [fibre radii], in [-1, 1]
 template <int Channels, class T>
 MEDULLA_FN UnscatteredLobes<Channels, T> unscattered_lobes(const FurParameters<Channels, T>& p, T theta_i, T theta_r,

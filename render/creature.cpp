@@ -25,7 +25,7 @@ struct Grid {
 Grid grid_about(const std::vector<Ball>& balls, float blend) {
     Vec3 low = balls[0].centre, high = low;
     float smallest = balls[0].radius;
-    const float swelling = blend * std::log(float(balls.size()));  // the most by which the union exceeds a ball
+    const float swelling = blend * std::log(float(balls.size()));  // bound of how far the union exceeds a ball
     for (const Ball& b : balls) {
         const float r = b.radius + swelling;
         low = {std::min(low.x, b.centre.x - r), std::min(low.y, b.centre.y - r), std::min(low.z, b.centre.z - r)};
@@ -36,14 +36,15 @@ Grid grid_about(const std::vector<Ball>& balls, float blend) {
     const float coarsest = std::cbrt(float(double(size.x) * double(size.y) * double(size.z) / most_cells));
     Grid grid{};
     grid.cell = std::max(smallest / cells_per_radius, std::max(coarsest, greatest(size) / 1000));
-    // A node on the surface of a ball about a round coordinate would make triangles without area: off by a third.
+    // Nodes on a ball's surface would make triangles without area. Balls often have round coordinates: shift by a
+    // third.
     grid.low = low - 1.35f * grid.cell * Vec3{1, 1, 1};
     const float extent[3] = {size.x, size.y, size.z};
     for (int a = 0; a < 3; ++a) grid.count[a] = std::uint32_t(std::ceil(extent[a] / grid.cell)) + 4;
     return grid;
 }
 
-/// f at every node; far from the surface a value of the same sign.
+/// f at every node; far from the surface, another value of the same sign.
 std::vector<float> values(const Blend& field, const Grid& grid) {
     std::vector<float> f(std::size_t(grid.count[0]) * grid.count[1] * grid.count[2]);
     constexpr std::uint32_t block = 4;
@@ -104,8 +105,8 @@ Mesh creature(const std::vector<Ball>& balls, float blend, const Placement& plac
                 }(),
             std::uint32_t(positions.size()));
         if (!added) return at->second;
-        // The place on the edge by bisection; kept from the nodes, where triangles would shrink to nothing, by a step
-        // that Newton's method takes back along the normal.
+        // The position on the edge by bisection, clamped away from the nodes, where triangles would lose their area.
+        // Newton's method along the normal then moves it back to the surface.
         const Vec3 from = grid.position(a), to = grid.position(b);
         float low = 0, high = 1;
         for (int step = 0; step < 8; ++step) {

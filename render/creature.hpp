@@ -10,10 +10,11 @@ namespace medulla::render {
 struct Ball {
     Vec3 centre;
     float radius;
-    float fur = 1;  ///< times the length of hairs here
+    float fur = 1;  ///< multiplies the length of the hairs here
 };
 
-/// f = -blend log sum exp(-(|p - centre| - radius) / blend): below 0 inside, and smooth everywhere but in the centres.
+/// f = -blend log sum exp(-(|p - centre| - radius) / blend): below 0 inside, and smooth everywhere except at the
+/// centres.
 struct Blend {
     const std::vector<Ball>& balls;
     float blend;  ///< width of the seams [the balls' unit]
@@ -26,10 +27,10 @@ struct Blend {
     Value at(Vec3 p) const;
 };
 
-/// f = 0, by marching tetrahedra with vertices moved onto it. The same triangles for the same balls.
+/// The surface f = 0 by marching tetrahedra, with vertices moved onto it. The same balls give the same triangles.
 Mesh creature(const std::vector<Ball>& balls, float blend, const Placement& placement);
 
-/// A standing fox of length 3 that looks along x, its feet on y = 0.
+/// A standing fox of length 3 that looks along x, with its feet on y = 0.
 const std::vector<Ball>& fox();
 
 }  // namespace medulla::render

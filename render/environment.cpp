@@ -7,7 +7,7 @@ namespace {
 
 constexpr double pi = 3.14159265358979323846;
 
-/// The first entry that is greater than u, of `count` that rise to 1; and how far u is on the way to it.
+/// The first of `count` increasing entries (the last is 1) that is greater than u, and the position of u in its step.
 template <class T>
 std::size_t find(const T* sums, std::size_t count, double u, double& within) {
     const std::size_t i = std::min(count - 1, std::size_t(std::upper_bound(sums, sums + count, T(u)) - sums));
@@ -58,7 +58,7 @@ Vec3 Environment::sample(Pair random) const {
     double in_x, in_y;
     const std::size_t y = find(rows_.data(), height, double(random.y), in_y);
     const std::size_t x = find(in_row_.data() + y * width, width, double(random.x), in_x);
-    // Even over the pixel's solid angle: in the angle around and in the cosine.
+    // Uniform over the pixel's solid angle: uniform in azimuth and in the cosine.
     const double top = std::cos(pi * double(y) / double(height)),
                  bottom = std::cos(pi * double(y + 1) / double(height));
     const double cosine = top + in_y * (bottom - top), sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));

@@ -1,5 +1,5 @@
-// Light from everywhere by a picture: width once around, height from straight up to straight down. A pixel has one
-// radiance over its solid angle, and directions are drawn in proportion to luminance: pdf = luminance / its integral.
+// An environment map: its width goes once around, its height from straight up to straight down. Radiance is constant
+// over a pixel's solid angle, and directions are sampled by luminance: pdf = luminance / integral of luminance.
 #pragma once
 
 #include <vector>
@@ -25,8 +25,8 @@ class Environment {
     Image image_;
     float turn_;
     float one_over_integral_ = 0;
-    std::vector<double> rows_;   ///< light of all rows up to and with this one, of 1
-    std::vector<float> in_row_;  ///< the same of the pixels of each row
+    std::vector<double> rows_;   ///< light of the rows up to and including this one, over that of all
+    std::vector<float> in_row_;  ///< the same for the pixels of each row
 };
 
 }  // namespace medulla::render

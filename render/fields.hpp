@@ -11,16 +11,16 @@
 
 namespace medulla::render {
 
-/// Throws Error that begins with `where` for text that is no JSON or nests deeper than any scene.
+/// Throws Error that begins with `where` for text that is not JSON or nests deeper than any scene.
 nlohmann::json parse_json(const std::string& text, const std::string& where);
 
 struct Range {
     double low, high;
-    bool open_low = false;  ///< low itself is outside
+    bool open_low = false;  ///< the range excludes low
 };
 inline constexpr Range any_number{-1e9, 1e9}, positive{0, 1e9, true}, at_least_0{0, 1e9}, share{0, 1};
 
-/// One object of the file. Reads the fields it is asked for; `done` refuses all others.
+/// One object of the file. `done` refuses all fields that have not been read.
 class Fields {
   public:
     /// @param pointer JSON pointer of the object in the file `where`
@@ -33,7 +33,7 @@ class Fields {
     Vec3 vector(const char* name, Vec3 otherwise, Range range = any_number);
     Rgb colour(const char* name, Rgb otherwise, Range range = at_least_0);  ///< one number or three
     std::string text(const char* name, const std::string& otherwise);
-    /// One of `names`; its index.
+    /// The index of a text among `names`.
     int choice(const char* name, const std::vector<std::string>& names, int otherwise);
     const nlohmann::json& list(const char* name);  ///< an empty list where it is absent
     const nlohmann::json& value(const char* name);
@@ -51,7 +51,7 @@ class Fields {
 
 double checked_number(const nlohmann::json& value, const std::string& place, Range range);
 Vec3 checked_vector(const nlohmann::json& value, const std::string& place, Range range);
-/// A value as it is quoted in a message.
+/// A value as quoted in a message.
 std::string quoted(const nlohmann::json& value);
 
 }  // namespace medulla::render

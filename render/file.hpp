@@ -1,4 +1,4 @@
-// Files that a scene names: their bytes, their numbers in either byte order, and where they stand in the world.
+// Files that a scene names: their bytes, their numbers in either byte order, and their placement in the world.
 #pragma once
 
 #include <cstdint>
@@ -14,21 +14,21 @@ namespace medulla::render {
 /// All bytes of a file. Throws Error where it cannot be read or is longer than `most`.
 std::string read_file(const std::string& path, std::uint64_t most);
 
-/// `name` beside the file `beside`, if it is not absolute.
+/// `name` relative to the folder of the file `beside`, if it is not absolute.
 std::string path_beside(const std::string& beside, const std::string& name);
 
 /// FNV-1a.
 std::uint64_t fingerprint(const void* bytes, std::size_t count);
 
-/// The words between white space.
+/// The words of a text, separated by white space.
 void split(std::string_view text, std::vector<std::string_view>& words);
-/// All of `word` as a finite number; false where it is none. The same in every locale.
+/// Parses all of `word` as a finite number, in every locale alike; false if it is not one.
 bool read_number(std::string_view word, double& x);
 bool read_whole(std::string_view word, std::int64_t& x);
-/// As it may stand in a message: its first 40 characters, in ASCII.
+/// A text as quoted in a message: its first 40 characters, in ASCII.
 std::string printable(std::string_view text);
 
-/// A number of a file at these bytes, in the byte order of the file.
+/// The number at these bytes of a file, in the file's byte order.
 template <class T>
 T load(const char* bytes, bool big_endian = false) {
     unsigned char ordered[sizeof(T)];
@@ -41,7 +41,7 @@ T load(const char* bytes, bool big_endian = false) {
     return value;
 }
 
-/// From a file's axes and unit to the world's: scaled, its up made y, turned about y, moved.
+/// Transform from a file's axes and unit to the world's: scale, up axis to y, turn about y, translate.
 struct Placement {
     float scale = 1;
     int up = 1;      ///< which of the file's axes is up: 0 x, 1 y, 2 z

@@ -1,4 +1,4 @@
-// What samples add up to, pixel by pixel; kept in a file so that a picture goes on after a kill.
+// Sums of the samples of each pixel; stored in a file, so that a killed run can be continued.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +21,9 @@ struct Pixel {
     double luminance_sum() const { return 0.2126 * sum[0] + 0.7152 * sum[1] + 0.0722 * sum[2]; }
 };
 
-/// What one sample, or the sum of a pixel's samples, is made of.
+/// The layers of one sample, or of the sum of a pixel's samples.
 struct Layers {
-    static constexpr int other = 6;  ///< paths whose first surface is no fibre, and lights that the camera sees
+    static constexpr int other = 6;  ///< paths whose first surface is not a fibre, and lights that the camera sees
     Rgb lobe[7];                     ///< radiance by the lobe of the first surface, a fibre: R, TT, .. residual; other
     Rgb direct;                      ///< radiance by one scattering or none
     Rgb albedo;                      ///< of the first surface
@@ -60,7 +60,7 @@ struct Film {
     void mean(double (&rgb)[3]) const;
 };
 
-/// Writes beside `path` and renames: at any moment the file is whole or absent. `key` says of which picture it is.
+/// Writes beside `path` and renames: at any moment the file is complete or absent. `key` identifies the picture.
 void save(const Film& film, const std::string& key, const std::string& path);
 /// False where there is no such file; throws Error where it belongs to another picture or is damaged.
 bool load(Film& film, const std::string& key, const std::string& path);

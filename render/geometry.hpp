@@ -1,9 +1,9 @@
 // What rays meet: strands as Embree's round B-spline curves, skins and ground as triangles.
 //
-// No ray is moved off the surface that it leaves. What it starts on is left out by name instead: on a fibre its own
-// strand within four radii of the start (the fibre model has already carried the light through to any side), on a skin
-// its own triangle. Backs are never hit, so that neither the far side of a fibre nor a neighbouring triangle below the
-// start stops a ray.
+// Ray origins are not offset from the surface. Instead, a ray ignores the primitive that it starts on: on a fibre, its
+// own strand within four radii of the start (the fibre model has already carried the light through the fibre), on a
+// skin, its own triangle. Back faces are never hit, so neither the far side of a fibre nor a neighbouring triangle
+// below the start stops a ray.
 #pragma once
 
 #include <embree3/rtcore.h>
@@ -19,7 +19,7 @@ namespace medulla::render {
 
 inline constexpr std::uint32_t nothing = 0xffffffffu;
 
-/// What a ray starts on; nothing for the camera's.
+/// The primitive that a ray starts on; nothing for camera rays.
 struct Start {
     std::uint32_t geometry = nothing, part = 0;  ///< part: strand or triangle
     float along = 0, reach = 0;                  ///< of a strand, both in segments

@@ -5,14 +5,14 @@
 namespace medulla::render {
 namespace {
 
-/// Points by the cell of space that they are in; cells as wide as the greatest distance looked for.
+/// Points in a grid, whose cells are as wide as the greatest distance of a query.
 class PointGrid {
   public:
     explicit PointGrid(float cell) : scale_(1 / cell) {}
 
     void add(Vec3 p, std::uint32_t index) { cells_[key(cell(p.x), cell(p.y), cell(p.z))].push_back({p, index}); }
 
-    /// Calls visit(point, index) for every point within a cell's width of p and for some beyond.
+    /// Calls visit(point, index) for every point within a cell's width of p, and for some farther ones.
     template <class Visit>
     void around(Vec3 p, Visit&& visit) const {
         const std::int64_t x = cell(p.x), y = cell(p.y), z = cell(p.z);
@@ -39,7 +39,7 @@ class PointGrid {
     std::unordered_map<std::uint64_t, std::vector<Entry>> cells_;
 };
 
-/// Smooth noise in [-1, 1]: random values at whole coordinates, interpolated.
+/// Smooth noise in [-1, 1]: random values at integer coordinates, interpolated.
 float value_noise(Vec3 p, std::uint32_t seed) {
     const float fx = std::floor(p.x), fy = std::floor(p.y), fz = std::floor(p.z);
     const float tx = smoothstep(0, 1, p.x - fx), ty = smoothstep(0, 1, p.y - fy), tz = smoothstep(0, 1, p.z - fz);
@@ -56,12 +56,12 @@ Vec3 rotate(Vec3 v, Vec3 axis, float angle) {
     return c * v + s * cross(axis, v) + (1 - c) * dot(axis, v) * axis;
 }
 
-/// The strand's centre line as the comb wants it, without curl and clumps: segments + 1 points from the skin outwards.
+/// The combed strand without curl and clumps: segments + 1 points from the skin outwards.
 std::vector<Vec3> combed(const SurfacePoint& root, const Layer& layer, float length, float noise_a, float noise_b) {
     const Vec3 n = root.normal;
     const Vec3 comb = render::length(layer.comb) > 0 ? normalise(layer.comb) : Vec3{};
     Vec3 tangent = comb - dot(comb, n) * n;
-    // Where the comb runs into the skin there is no direction to lean to: hairs stand up there, without a seam.
+    // Where the comb points into the skin, there is no direction to lean in. Hairs stand up there, without a seam.
     const float sure = std::min(1.0f, 2 * render::length(tangent));
     tangent = sure > 1e-4f ? normalise(tangent) : basis_about(n).y;
     if (layer.swirl > 0)
@@ -96,7 +96,7 @@ std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::
         });
         if (!free) continue;
         grid.add(p.position, std::uint32_t(placed++));
-        if (p.fur > 0) points.push_back(p);  // a bald place takes its share of the strands
+        if (p.fur > 0) points.push_back(p);  // bald skin still counts towards the density
     }
     return points;
 }
@@ -143,7 +143,7 @@ Strands grow(const Shape& shape, const Layer& layer) {
             });
             for (std::size_t k = 1; least < 1e30f && k < line.size(); ++k) {
                 const float s = float(k) / float(layer.segments), pull = layer.clump_strength * std::pow(s, 1.5f);
-                // Towards the guide's line at the same place; the strand's own length stays along it.
+                // Towards the guide strand at the same position; the strand keeps its length along it.
                 line[k] = mix(line[k], guides[nearest][k], pull);
             }
         }

@@ -9,10 +9,10 @@
 namespace medulla::render {
 
 Strands grow(const Shape& shape, const Layer& layer);
-/// The fibre through its points.
+/// The strand of a single fibre, through its points.
 Strands strand_of(const SingleFibre& fibre);
 
-/// Points of the surface no two of which are nearer than `distance`, in space; at most `count` of them.
+/// At most `count` points of the surface, no two of them nearer than `distance` in space.
 std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::size_t count, std::uint32_t seed);
 
 }  // namespace medulla::render

@@ -144,7 +144,7 @@ Image read_hdr(const std::string& path, const std::string& bytes) {
                     for (std::size_t k = 0; k < count; ++k) row[4 * x++ + c] = byte(values, run ? 0 : k);
                 }
         } else {
-            int shift = 0;  // repeated repeats count in higher digits
+            int shift = 0;  // consecutive repeat counts are higher digits of one count
             for (std::size_t x = 0; x < std::size_t(width);) {
                 const std::string_view p = take(4);
                 if (byte(p, 0) == 1 && byte(p, 1) == 1 && byte(p, 2) == 1) {
@@ -188,9 +188,9 @@ Image read_png(const std::string& path, const std::string& bytes, bool linear) {
     const std::size_t count = std::size_t(png.width) * png.height;
     png.format = PNG_FORMAT_RGB;
     std::vector<std::uint8_t> values(3 * count);
-    const png_color black{};  // under what is transparent
+    const png_color black{};  // behind transparent pixels
     check(png_image_finish_read(&png, &black, values.data(), 0, nullptr));
-    float decoded[256];  // libpng's own linear form has no more digits than the 8 bits
+    float decoded[256];  // libpng's own linear output is no more precise than the 8 bits
     for (int i = 0; i < 256; ++i) {
         const double x = i / 255.0;
         decoded[i] = float(!linear ? x : x <= 0.04045 ? x / 12.92 : std::pow((x + 0.055) / 1.055, 2.4));

@@ -16,8 +16,8 @@ struct Image {
 
 inline constexpr std::uint64_t greatest_image_file = std::uint64_t(1) << 31;
 
-/// By the end of the file's name.
-/// @param linear whether the numbers of a PNG are decoded from sRGB; otherwise they are taken as they are, of 1
+/// The format is chosen by the end of the file's name.
+/// @param linear whether PNG values are decoded from sRGB; otherwise they are taken as they are, in [0, 1]
 Image read_image(const std::string& path, const std::string& bytes, bool linear = true);
 Image read_png(const std::string& path, const std::string& bytes, bool linear);
 Image read_exr(const std::string& path, const std::string& bytes);

@@ -32,7 +32,7 @@ void write_png(const Film& film, const Picture& picture, const std::string& path
     for (std::size_t i = 0; i < film.pixels.size(); ++i) {
         const Rgb c = film.colour(i);
         const float channel[3] = {c.x, c.y, c.z};
-        // One dither for the three channels, half a step either way: no bands in a smooth wall, no coloured noise.
+        // Dither of half a step either way, the same for the three channels: no banding, no coloured noise.
         const float dither = unit_float(scatter_bits(std::uint32_t(i))) - 0.5f;
         for (std::size_t k = 0; k < 3; ++k) {
             const float x = std::max(0.0f, scale * channel[k]);
@@ -91,7 +91,7 @@ std::vector<Channel> channels_of(const Film& film) {
 void write_exr(const Film& film, const std::string& path) {
     const std::vector<Channel> channels = channels_of(film);
     const std::size_t width = std::size_t(film.width);
-    std::vector<float> row(channels.size() * width);  // one of each: no second picture in memory
+    std::vector<float> row(channels.size() * width);  // one row of each: no second picture in memory
     try {
         Imf::Header header(film.width, film.height);
         Imf::FrameBuffer buffer;

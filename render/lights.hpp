@@ -1,4 +1,4 @@
-// The lights of a scene as something to sample and to meet. A light blocks nothing.
+// The lights of a scene: sampling them, and finding those that a ray hits. A light blocks nothing.
 #pragma once
 
 #include <limits>
@@ -13,7 +13,7 @@ struct LightSample {
     Vec3 direction;
     float distance = std::numeric_limits<float>::infinity();
     Rgb radiance;
-    float pdf = 0;  ///< per steradian, the choice of the light included; 0: nothing from there
+    float pdf = 0;  ///< per steradian, including the choice of the light; 0: no light from there
 };
 
 class Lights {
@@ -53,7 +53,7 @@ class Lights {
         return s;
     }
 
-    /// Calls visit(radiance, pdf) for every light that a ray meets before `distance`; pdf as of `sample`.
+    /// Calls visit(radiance, pdf) for every light that a ray hits before `distance`; pdf is that of `sample`.
     template <class Visit>
     void met(Vec3 from, Vec3 direction, float distance, Visit&& visit) const {
         const bool escaped = distance == std::numeric_limits<float>::infinity();

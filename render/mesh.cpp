@@ -14,8 +14,8 @@ Vec3 area_vector(const Mesh& m, std::size_t triangle) {
 }
 
 Mesh mesh_of(const Polygons& polygons, const MeshFile& how) {
-    // One vertex for each position and normal that meet; where the file has no normal, the mean of the faces about the
-    // position, by area.
+    // One vertex for each pair of position and normal. Where the file has no normal, it is the area-weighted mean of
+    // the faces around the position.
     std::vector<Vec3> positions, faces(polygons.positions.size());
     for (const Vec3& p : polygons.positions) positions.push_back(how.placement.point(p));
     struct Triangle {
@@ -113,7 +113,7 @@ std::vector<std::uint32_t> triangulate(const std::vector<Vec3>& corner) {
                     clear = !(turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0);
             if (clear) ear = k;
         }
-        if (ear == left.size()) ear = 1;  // crossed or flat: any cut is as good
+        if (ear == left.size()) ear = 1;  // self-intersecting or flat: any triangle will do
         const std::size_t n = left.size();
         cut.insert(cut.end(), {left[(ear + n - 1) % n], left[ear], left[(ear + 1) % n]});
         left.erase(left.begin() + std::ptrdiff_t(ear));

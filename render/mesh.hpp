@@ -1,4 +1,4 @@
-// Triangles: their area, points spread evenly over them, and polygons from files cut into them.
+// Triangle meshes: their area, uniform points on them, and the triangulation of polygons from files.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,14 @@ namespace medulla::render {
 
 struct SurfacePoint {
     Vec3 position, normal;
-    float fur = 1;  ///< times the length of hairs that grow here; 0: none grow
+    float fur = 1;  ///< multiplies the length of hairs that grow here; 0: none grow
 };
 
 struct Mesh {
     std::vector<Vec3> positions, normals;
     std::vector<float> fur;              ///< SurfacePoint::fur of each vertex; empty: 1
     std::vector<std::uint32_t> indices;  ///< three a triangle, counter-clockwise seen from outside
-    std::vector<double> area;            ///< of all triangles up to and with this one; only where points are drawn
+    std::vector<double> area;            ///< of the triangles up to and including this one; only where points are drawn
     Rgb albedo;
 
     SurfacePoint at(std::size_t triangle, float u, float v) const;
@@ -29,7 +29,7 @@ struct Mesh {
 };
 SurfacePoint sample_surface(const Mesh& mesh, Sequence& random);
 
-/// What files of meshes have: corners of polygons by their numbers.
+/// A mesh as files have it: polygons whose corners are indices.
 struct Polygons {
     static constexpr std::uint32_t none = 0xffffffffu;
     struct Corner {
@@ -47,7 +47,7 @@ struct MeshFile {
 
 inline constexpr std::uint64_t greatest_mesh_file = std::uint64_t(1) << 32;
 
-/// By the end of the file's name; throws Error: file, place, expected, found.
+/// The format is chosen by the end of the file's name. Throws Error: file, place, expected, found.
 Mesh read_mesh(const std::string& path, const std::string& bytes, const MeshFile& how);
 Polygons read_obj(const std::string& path, const std::string& bytes);
 Polygons read_ply(const std::string& path, const std::string& bytes);

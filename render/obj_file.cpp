@@ -1,4 +1,4 @@
-// Wavefront OBJ: v, vn and f; what says nothing of the surface is skipped, free-form geometry is refused.
+// Wavefront OBJ: v, vn and f. Statements that do not describe the surface are skipped, free-form geometry is refused.
 #include <set>
 
 #include "render/error.hpp"

@@ -12,7 +12,7 @@ constexpr int first_roulette_vertex = 8;
 constexpr float spread_of_fibre =
     0.2f;  // of a cone that a fibre has scattered [radians]: about beta_n of Table 4's animals
 
-/// Adds the time it lives to a counter.
+/// Adds its lifetime to a counter.
 template <bool Timed>
 class Stopwatch {
   public:
@@ -35,7 +35,7 @@ float share_of(float pdf, float other) {
     return 1 / (1 + r * r);
 }
 
-/// Even over the unit disc (Shirley and Chiu 1997).
+/// Uniform over the unit disc (Shirley and Chiu 1997).
 Pair on_disc(Pair u) {
     const float a = 2 * u.x - 1, b = 2 * u.y - 1;
     if (a == 0 && b == 0) return {0, 0};
@@ -44,7 +44,7 @@ Pair on_disc(Pair u) {
     return {r * std::cos(angle), r * std::sin(angle)};
 }
 
-/// What a surface does with light from one direction; a direction that it draws.
+/// A surface's value for light from one direction; and a direction that it samples.
 struct Towards {
     Rgb value;      ///< times the light's radiance it is radiance along the path, per steradian
     float pdf = 0;  ///< of drawing that direction, per steradian
@@ -95,7 +95,7 @@ PathTracer::~PathTracer() = default;
 
 Ray PathTracer::camera_ray(int x, int y, Random& random) const {
     const Camera& c = scene_.camera;
-    // The pixel filter is a tent, drawn from: every sample has weight 1 and belongs to one pixel.
+    // The pixel filter, a tent, is sampled: every sample has weight 1 and belongs to one pixel.
     const Pair jitter = random.pair();
     const float height = float(scene_.picture.height);
     const float sx = (2 * (float(x) + 0.5f + tent(jitter.x)) - float(scene_.picture.width)) / height;
@@ -126,11 +126,10 @@ Rgb PathTracer::sample(int x, int y, std::uint32_t sample, std::uint32_t seed, b
 
 template <bool Timed>
 Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts, Layers* layers) const {
-    // What part of the light of later vertices, and of the first one's light sample, each lobe of the first has sent
-    // on.
+    // The share of each lobe of the first vertex in the light of later vertices, and in the first one's light sample.
     Shares onwards, to_light;
     Rgb sum, throughput{1, 1, 1};
-    float pdf = 0;  // of the direction that was drawn; 0: the camera's, which no light sample competes with
+    float pdf = 0;  // of the sampled direction; 0: camera ray, for which there is no light sample
     float width = 0, spread = pixel_angle_;
     const auto add = [&](Rgb light, bool direct, const Shares& shares) {
         const float y = luminance(light);

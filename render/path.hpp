@@ -12,12 +12,12 @@ namespace medulla::render {
 
 class Shading;  // shading.hpp: all of the runtime, which only path.cpp needs to see
 
-/// What of a fibre's width a vertex takes in.
+/// Which part of a fibre's width a vertex averages over.
 enum class FieldChoice { one_offset, whole_width, multiscale };
 
 struct Counts {
     std::uint64_t rays = 0, vertices = 0, nonfinite = 0;
-    std::uint64_t clamped = 0;  ///< vertices whose fibre had parameters out of range, or that are no numbers
+    std::uint64_t clamped = 0;  ///< vertices whose fibre had parameters out of range, or NaN
     /// Of the samples that were timed [ns].
     std::uint64_t traversal = 0, shading = 0, all = 0;
     Counts& operator+=(const Counts& o) {
@@ -29,9 +29,9 @@ struct Counts {
 
 struct PathOptions {
     FieldChoice field = FieldChoice::one_offset;
-    std::uint32_t lobes = 63;   ///< by which fibres scatter: a LobeMask, all of them
+    std::uint32_t lobes = 63;   ///< the lobes by which fibres scatter, a LobeMask; 63: all
     float clamp = 0;            ///< most that one vertex after the first may add [luminance]; 0: no limit, no bias
-    bool sample_lights = true;  ///< next-event estimation; without it lights are only met
+    bool sample_lights = true;  ///< next-event estimation; without it, lights are found by scattering alone
 };
 
 class PathTracer {
@@ -40,8 +40,8 @@ class PathTracer {
     ~PathTracer();
 
     /// Radiance along one camera ray. Its random numbers are those of (seed, pixel, sample).
-    /// @param timed whether to spend clock readings on the shares of Counts
-    /// @param layers null, or what the radiance is made of; the radiance is the same bits
+    /// @param timed whether to read the clock for the times in Counts
+    /// @param layers null, or receives the layers of the radiance; the radiance is the same bits either way
     Rgb sample(int x, int y, std::uint32_t sample, std::uint32_t seed, bool timed, Counts& counts,
                Layers* layers = nullptr) const;
 

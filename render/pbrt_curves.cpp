@@ -110,7 +110,7 @@ Affine rotation(double degrees, double x, double y, double z) {
              y * z * d - x * s, 0, z * x * d - y * s, z * y * d + x * s, z * z * d + c, 0}};
 }
 
-// Statements whose parameters say nothing of where curves are.
+// Statements that do not affect where curves are.
 const std::set<std::string_view> skipped{
     "Accelerator", "AreaLightSource", "Attribute",         "Camera",      "ColorSpace",       "CoordinateSystem",
     "Film",        "Filter",          "Integrator",        "LightSource", "LookAt",           "MakeNamedMaterial",
@@ -238,7 +238,7 @@ class CurveReader {
                         fmt::format("{} numbers", p.size()));
         float radius[2] = {how_.radius, how_.radius};
         if (how_.radius == 0) {
-            // Under a transform that scales unevenly no round fibre stays round: the mean of the three scales.
+            // A non-uniform scale would not keep the fibre round: use the geometric mean of the three scales.
             const double scale = 0.5 * std::cbrt(std::abs(now_.determinant())) * double(how_.placement.scale);
             for (int k = 0; k < 2; ++k) radius[k] = float(width[k] * scale);
             if (!(width[0] >= 0 && width[1] >= 0 && radius[0] + radius[1] > 0 && radius[0] + radius[1] < 1e9f))
@@ -256,7 +256,7 @@ class CurveReader {
         for (const Vec3& q : points_) extent = std::max(extent, length(q - points_[0]));
         if (!(extent > 0)) lexer_.fail(line, "a curve of length > 0", "0");
 
-        // Exporters cut a strand into curves: one that begins where the last ended goes on.
+        // Exporters cut a strand into curves: one that begins where the last ended continues it.
         const bool goes_on = bezier && open_ && length(points_[0] - end_) == 0;
         if (!goes_on) close_strand();
         if (bezier) {
@@ -284,7 +284,7 @@ class CurveReader {
     std::vector<Affine> stack_;
     std::vector<Vec3> points_;
     Strands strands_;
-    bool open_ = false;  ///< a strand of Bezier curves that may go on
+    bool open_ = false;  ///< whether the last strand, of Bezier curves, may continue
     Vec3 end_;
 };
 

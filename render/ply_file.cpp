@@ -1,5 +1,5 @@
 // PLY: ASCII and binary of either byte order. Elements vertex (x, y, z, and nx, ny, nz) and face (vertex_indices or
-// vertex_index); other elements and properties are read over.
+// vertex_index); other elements and properties are skipped.
 #include <array>
 
 #include "render/error.hpp"
@@ -105,7 +105,7 @@ class PlyReader {
             }
         }
         for (const Element& e : elements_) {
-            // A record is at least a byte long: a count that the file cannot have is seen before the first is read.
+            // A record is at least a byte long, so an impossible count is detected before the first record is read.
             if (e.count > rest_.size() || (e.properties.empty() && e.count > 0))
                 throw Error("{}: element {}: expected a count that fits {} bytes, found {}", path_, printable(e.name),
                             rest_.size(), e.count);

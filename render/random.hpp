@@ -58,7 +58,7 @@ class Random {
 
     Pair pair() {
         const std::uint32_t seed = hash(stream_, dimension_++);
-        if (dimension_ > stratified_pairs) {  // a path's far end: its strata overlap in nothing that shows
+        if (dimension_ > stratified_pairs) {  // deep in a path, where stratification has no visible effect
             const std::uint32_t bits = hash(seed, sample_);
             return {unit_float(bits), unit_float(scatter_bits(bits ^ 0xb5297a4du))};
         }

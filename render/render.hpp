@@ -1,4 +1,4 @@
-// A picture from a scene: passes over tiles by threads, until the samples, the time or the error that was set.
+// Renders a scene: threads make passes over tiles, until the given number of samples, time or error is reached.
 #pragma once
 
 #include <functional>
@@ -12,14 +12,14 @@ namespace medulla::render {
 struct RenderOptions {
     PathOptions path;
     std::uint32_t samples = 64;  ///< per pixel; an upper bound where seconds or error are set
-    double seconds = 0;          ///< stop after the pass in which they have gone by; 0: no limit
+    double seconds = 0;          ///< stop after the first pass that ends later than this; 0: no limit
     double error = 0;            ///< stop at this Film::error; 0: no limit
     int threads = 0;             ///< 0: all there are
     std::uint32_t seed = 0;
     bool stats = false;      ///< fill the times of Counts
-    std::string unfinished;  ///< where to keep a picture in work; empty: nowhere
-    bool resume = false;     ///< begin from there
-    std::string key;         ///< of what decides the picture, for that file
+    std::string unfinished;  ///< file of the unfinished picture; empty: none
+    bool resume = false;     ///< continue from that file
+    std::string key;         ///< identifies the picture in that file: everything that its pixels depend on
 };
 
 struct Report {
@@ -28,10 +28,10 @@ struct Report {
     std::uint32_t begun_at = 0;  ///< samples per pixel that an earlier run had done
 };
 
-/// Samples per pixel between two looks at the clock and the error.
+/// Samples per pixel of a pass, after which time and error are checked.
 inline constexpr std::uint32_t samples_per_pass = 8;
 
-/// @param progress called after each tile with the share done, from one thread at a time
+/// @param progress called after each tile with the share that is done, by one thread at a time
 Report render(const PathTracer& tracer, const RenderOptions& options, Film& film,
               const std::function<void(double)>& progress);
 

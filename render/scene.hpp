@@ -1,4 +1,4 @@
-// A scene as its file says it: docs/render.md. Lengths in world units, angles in radians (degrees in the file).
+// A scene as read from its file (docs/render.md). Lengths in world units, angles in radians (degrees in the file).
 // Rests on the runtime's FurParameters.
 #pragma once
 
@@ -36,18 +36,18 @@ struct Material {
 struct Layer {
     std::vector<Stop> along;
     std::vector<std::shared_ptr<const Texture>> textures;
-    float colour_noise = 0;  ///< spread of sigma_ca from strand to strand: factors exp(+-colour_noise)
+    float colour_noise = 0;  ///< variation of sigma_ca from strand to strand: factors exp(+-colour_noise)
     float density = 1000;    ///< strands per unit of area
-    float length = 0.2f, length_noise = 0.2f;  ///< noise: share of the length, even in +-
+    float length = 0.2f, length_noise = 0.2f;  ///< noise: share of the length, uniform in +-
     float radius = 0.002f;                     ///< at the root
     float tip = 0.2f;                          ///< radius at the tip over that at the root
-    float taper = 0.5f;                        ///< place along the strand from which on it narrows
-    float lean = 0.5f, bend = 0.5f;            ///< angle from the normal at the root; what is added up to the tip
-    Vec3 comb{0, -1, 0};                       ///< where to, projected onto the skin
+    float taper = 0.5f;                        ///< position along the strand from which it narrows
+    float lean = 0.5f, bend = 0.5f;            ///< angle from the normal at the root; further angle up to the tip
+    Vec3 comb{0, -1, 0};                       ///< direction of the lean, projected onto the skin
     float noise = 0.1f;                        ///< random angle from strand to strand
-    float swirl = 0, swirl_size = 0.5f;        ///< smooth turning of the comb across the coat, over a length
+    float swirl = 0, swirl_size = 0.5f;        ///< largest smooth turn of the comb across the coat; its length scale
     float curl_radius = 0, curl_turns = 2;
-    float clump_size = 0, clump_strength = 0;  ///< distance between clumps; how far tips move to their clump's, [0, 1]
+    float clump_size = 0, clump_strength = 0;  ///< distance between clumps; how far tips join them, [0, 1]
     int segments = 6;
     std::uint32_t seed = 1;
 };
@@ -59,7 +59,7 @@ struct Shape {
     Vec3 centre;
     float radius = 1, tube = 0.4f;     ///< sphere and torus (about y); the torus' tube
     float width = 1, depth = 1;        ///< patch, in the plane y = 0, seen from above
-    std::shared_ptr<const Mesh> mesh;  ///< of mesh and creature, where it stands
+    std::shared_ptr<const Mesh> mesh;  ///< of mesh and creature, in world space
 };
 
 struct Object {
@@ -81,7 +81,7 @@ struct Ground {
     bool present = false;
     float height = -1;  ///< y
     float size = 20;    ///< half its width
-    float wall = 0;     ///< distance behind the origin (-z) at which it turns up; 0: never
+    float wall = 0;     ///< distance behind the origin (-z) at which the floor curves up; 0: no wall
     Rgb colour{0.4f, 0.4f, 0.4f};
 };
 
@@ -105,7 +105,7 @@ struct Scene {
     std::vector<SingleFibre> fibres;
     Ground ground;
     std::vector<Light> lights;
-    std::string text;  ///< the file and fingerprints of those it names, to tell whether a picture that goes on is of it
+    std::string text;  ///< the file, and fingerprints of those that it names: identifies the scene for --resume
 };
 
 /// Throws Error: one line with file, field, expected and found.

@@ -1,5 +1,5 @@
-// All that the renderer takes from medulla: dense tables for each coat, the fibre at a hit, and its field, which the
-// path tracer evaluates towards lights and samples.
+// Everything that the renderer uses of medulla: dense tables for each coat, the fibre at a hit, and its field, which
+// the path tracer samples and evaluates towards lights.
 #pragma once
 
 #include <cmath>
@@ -16,16 +16,16 @@
 
 namespace medulla::render {
 
-/// What a ray found. Unit vectors in world space.
+/// A ray's hit on a strand. Unit vectors in world space.
 struct FibreHit {
-    std::size_t layer;  ///< whose strand it is
+    std::size_t layer;  ///< that the strand belongs to
     Vec3 tangent;       ///< from root to tip
     Vec3 known;         ///< back along the ray
     Vec3 point;         ///< from the axis to the hit [fibre radii]
     float footprint;    ///< diameter of the path's cone [fibre radii]
     float along;        ///< [0, 1] from root to tip
     float colour;       ///< factor of sigma_ca
-    Vec3 root;          ///< where the strand begins, in the world
+    Vec3 root;          ///< where the strand begins, in world space
     float column = 0;   ///< [0, 1) by strand, for textures
 };
 
@@ -58,7 +58,7 @@ class Shading {
         for (const Strands& layer : layers) coats_.push_back(make_coat(scene.materials, layer, pack));
     }
 
-    /// Share of the light that leaves the fibre again, of a ray that meets it at the hit's offset.
+    /// Share of the light that leaves the fibre again, for a ray at the hit's offset.
     Rgb albedo(const FibreHit& hit) const {
         const Basis basis = basis_about(hit.tangent);
         const Vector known = FieldInWorld<int>::local(basis, hit.known);
@@ -67,7 +67,7 @@ class Shading {
         return rgb(lobes_ == all_lobes ? field.albedo() : field.keep(lobes_).albedo());
     }
 
-    /// Calls use(field in world) for the fibre at a hit; whether its parameters were clamped to their ranges.
+    /// Calls use(field in world) for the fibre at a hit; returns whether its parameters were clamped to their ranges.
     template <class Use>
     bool at(const FibreHit& hit, FieldChoice choice, Use&& use) const {
         const Basis basis = basis_about(hit.tangent);
@@ -87,7 +87,7 @@ class Shading {
     }
 
   private:
-    /// A cone narrower than this share of the radius sees one offset.
+    /// For a cone narrower than this share of the radius, a single offset is used.
     static constexpr float narrow_footprint = 0.05f;
 
     struct Free {
@@ -110,7 +110,7 @@ class Shading {
         use(FieldInWorld<Field>{basis, lobes_ == all_lobes ? field : field.keep(lobes_)});
     }
 
-    /// Tables over all that materials between the stops, and textures, can ask for: the ends of each parameter's range.
+    /// Tables for the ranges of all parameters that interpolation between the stops and textures can give.
     static Coat make_coat(const std::vector<Material>& materials, const Strands& layer, const PackView& pack) {
         const std::vector<Stop>& along = layer.along;
         Coat coat;
@@ -155,7 +155,7 @@ class Shading {
         return even ? coat.first : fibre_at(coat, hit);
     }
 
-    /// All parameters interpolated between the two stops about the hit.
+    /// All parameters interpolated between the two stops next to the hit.
     static Fibre<3> fibre_at(const Coat& coat, const FibreHit& hit) {
         std::size_t next = 0;
         while (next < coat.stops.size() && coat.stops[next].at <= hit.along) ++next;
@@ -177,8 +177,7 @@ class Shading {
 
     static void set(FurParameters<3>& p, Sets what, Rgb value) {
         const float channel[3] = {value.x, value.y, value.z};
-        // A colour is what a ray through the axis keeps, over two radii; comparisons that let what is no number
-        // through.
+        // A colour is the transmittance of a ray through the axis, over two radii. These comparisons let NaN through.
         const auto absorption = [](float c) { return -0.5f * std::log(c < 1e-3f ? 1e-3f : c > 1 ? 1 : c); };
         for (int c = 0; c < 3; ++c) {
             if (what == Sets::sigma_ca) p.sigma_ca[c] = channel[c];

@@ -1,4 +1,4 @@
-// Shapes of a scene: area, points spread evenly over it, and a mesh of the skin.
+// Shapes of a scene: area, uniform points on them, and a mesh of the skin.
 #pragma once
 
 #include "render/mesh.hpp"

@@ -1,4 +1,4 @@
-// Strands as uniform cubic B-splines, each of its own number of segments, and the ways to make one.
+// Strands as uniform cubic B-splines, each with its own number of segments, and the functions that make them.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@
 
 namespace medulla::render {
 
-/// The material at a place along the strand; between two of them every parameter is interpolated.
+/// The material at a position along the strand; between two stops, every parameter is interpolated.
 struct Stop {
     float at;  ///< 0 root, 1 tip
     int material;
@@ -54,11 +54,12 @@ void append_along(const std::vector<Vec3>& line, const std::vector<float>& radiu
 void append_through(const std::vector<Vec3>& line, const std::vector<float>& radius, Strands& strands);
 /// Adds one cubic Bezier segment, exactly, to the strand that `end_strand` closes.
 void add_bezier(const Vec3 (&p)[4], float radius_0, float radius_1, Strands& strands);
-/// Adds the segments of a uniform B-spline by its control points (four or more); radii go evenly from one to the other.
+/// Adds the segments of a uniform B-spline by its control points (four or more); radii are linear from the first to the
+/// last.
 void add_bspline(const std::vector<Vec3>& p, float radius_0, float radius_1, Strands& strands);
 void end_strand(Strands& strands);
 
-/// Keeps this share of the strands, chosen by their number alone, and at least one.
+/// Keeps this share of the strands, at least one. The choice depends on their number alone.
 void thin(Strands& strands, double share);
 
 }  // namespace medulla::render

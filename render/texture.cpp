@@ -11,7 +11,7 @@ Rgb Texture::at(Vec3 root, float along, float column) const {
         s = 0.5f + std::atan2(d.x, d.z) / (2 * pi_f);
         t = 1 - std::atan2(std::sqrt(d.x * d.x + d.z * d.z), d.y) / pi_f;
     }
-    // Pixels' centres lie at halves; the edge goes on beyond them, and around a body the other edge.
+    // Pixel centres are at halves. Beyond them the edge continues, or, around a body, the opposite edge.
     const float width = float(image.width), height = float(image.height);
     const bool closed = mapping == Mapping::around;
     const float x = std::clamp(s * width - 0.5f, closed ? -1.0f : 0.0f, closed ? width : width - 1);

@@ -5,7 +5,7 @@
 
 namespace medulla::render {
 
-/// sigma_ca and kappa are replaced, by a colour sigma_ca is; the others are multiplied.
+/// sigma_ca and kappa replace the material's, a colour replaces sigma_ca; the others are factors.
 enum class Sets { sigma_ca, colour, kappa, sigma_ms_factor, sigma_ca_factor };
 enum class Mapping { planar, around, strand };
 
@@ -14,13 +14,13 @@ struct Texture {
     Mapping mapping = Mapping::planar;
     Image image;
     float scale = 1;
-    Vec3 origin;                  ///< planar: of the picture's lower left corner; around: the centre
+    Vec3 origin;                  ///< planar: the picture's lower left corner; around: the centre
     Vec3 u{1, 0, 0}, v{0, 1, 0};  ///< planar: its lower and left edge
 
     /// @param root where the strand leaves the skin
     /// @param along [0, 1] from root to tip
     /// @param column [0, 1) by strand
-    /// Between four pixels; not finite where one of them is not.
+    /// Bilinear; not finite where one of the four pixels is not.
     Rgb at(Vec3 root, float along, float column) const;
 };
 

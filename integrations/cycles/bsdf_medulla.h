@@ -1,11 +1,11 @@
-/* A fur fibre as a closure of Cycles, beside kernel/closure/bsdf_principled_hair_chiang.h. docs/integrations.md has the
- * conventions and the places where Cycles names a closure.
+/* A fur fibre as a closure of Cycles, to be placed beside kernel/closure/bsdf_principled_hair_chiang.h.
+ * docs/integrations.md has the conventions and the places where Cycles lists its closures.
  *
- * Frame: X = dPdu, root to tip; Y = X x wi; Z = X x Y, right-handed: the fibre's axes. h: sine between the normal and
- * Z as seen from X, as Cycles' own hair has it.
- * Measure: eval returns the value with its cosine, so the fibre's value as it is.
+ * Frame: X = dPdu, root to tip; Y = X x wi; Z = X x Y. These are the fibre's axes, and right-handed. h: sine of the
+ * angle from the normal to Z about X, as in Cycles' own hair.
+ * Measure: eval includes the cosine, so it returns the fibre's value unchanged.
  * Transport: sd->wi is the known direction, towards the viewer; wo is drawn.
- * Random numbers: three; z, which picks the lobe, is stretched into two of 12 bits. */
+ * Random numbers: three; z, which chooses the lobe, is split into two of 12 bits. */
 
 #pragma once
 
@@ -54,7 +54,7 @@ ccl_device_inline Spectrum medulla_spectrum(const medulla::Colour<3> &colour)
   return make_float3(colour.value[0], colour.value[1], colour.value[2]);
 }
 
-/* Sets up a closure that bsdf_alloc has made; false where there is no room for it or the parameters are bad.
+/* Sets up a closure from bsdf_alloc; false if there is no room for it or the parameters are invalid.
  * type: the ClosureType that was added for it. */
 ccl_device bool bsdf_medulla_setup(ccl_private ShaderData *sd,
                                    ccl_private MedullaBSDF *bsdf,

@@ -1,11 +1,10 @@
 // A fur fibre as a BSDF plugin of Mitsuba 3. docs/integrations.md has the conventions and how to build it.
 //
-// Frame: on a `bsplinecurve` the local y runs along the curve, which this takes as root to tip, and z along the
-// outward normal; (y, z, x) is right-handed: the fibre's axes. h: sine between the normal and wi in the cross-section.
-// Measure: eval has the cosine in it, so it is the fibre's value as it is.
-// Transport: wi is the known direction whatever ctx.mode says; the model is not reciprocal.
-// Random numbers: three; sample1 is stretched into two of 12 bits.
-// Variants: scalar ones. The library computes in floats of its own, so Dr.Jit's arrays are refused.
+// Frame: on a `bsplinecurve`, the local y axis runs along the curve (assumed to be root to tip), and z along the
+// outward normal. The fibre's axes are (y, z, x), which is right-handed. h: sine of the angle from the normal to wi in
+// the cross-section. Measure: eval includes the cosine, so it returns the fibre's value unchanged. Transport: wi is the
+// known direction in every ctx.mode; the model is not reciprocal. Random numbers: three; sample1 is split into two of
+// 12 bits. Variants: scalar ones only. The runtime computes in plain floats, so Dr.Jit's arrays are refused.
 #include <memory>
 
 #include <mitsuba/core/properties.h>

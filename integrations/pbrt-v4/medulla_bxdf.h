@@ -1,12 +1,12 @@
 // A fur fibre as a BxDF of pbrt-v4. docs/integrations.md has the conventions and the lines to add to pbrt.
 //
-// Frame: pbrt's BSDF frame has x along dp/du of the curve, which this takes as root to tip, and is right-handed: its
-// axes are the fibre's. h: a curve's v grows along travel x tangent, the fibre's h along tangent x travel, so
-// h = 1 - 2 v. (pbrt's own HairBxDF takes h = 2 v - 1, which mirrors its azimuths, and with alpha > 0 tilts R towards
+// Frame: pbrt's BSDF frame is right-handed with x along dp/du of the curve (assumed to be root to tip), so its axes are
+// the fibre's. h: a curve's v increases along travel x tangent, the fibre's h along tangent x travel, hence
+// h = 1 - 2 v. (pbrt's own HairBxDF uses h = 2 v - 1, which mirrors its azimuths, and with alpha > 0 tilts R towards
 // the tip.)
-// Measure: pbrt multiplies f by |cos| of the shading normal, so f is the fibre's value over it.
+// Measure: pbrt multiplies f by |cos| of the shading normal, so f is the fibre's value divided by it.
 // Transport: wo is the known direction in both modes; the model is not reciprocal.
-// Random numbers: pbrt gives three; uc is stretched into two of 12 bits.
+// Random numbers: pbrt supplies three; uc is split into two of 12 bits.
 #pragma once
 
 #include <pbrt/bxdfs.h>
@@ -50,7 +50,7 @@ class MedullaBxDF {
     PBRT_CPU_GPU static constexpr const char* Name() { return "MedullaBxDF"; }
     std::string ToString() const { return "[ MedullaBxDF ]"; }
 
-    /// What is wrong with the parameters or tables, if anything.
+    /// Whether parameters and tables are valid, or what is wrong with them.
     PBRT_CPU_GPU medulla::FibreStatus Status() const { return fibre.status; }
 
   private:

@@ -1,10 +1,10 @@
 // A fur fibre as a Bsdf of Tungsten. docs/integrations.md has the conventions and the lines to add to Tungsten.
 //
-// Frame: a curve's local frame has y along its derivative, which this takes as root to tip, and z along the normal;
-// (y, z, x) is right-handed: the fibre's axes. h: sine between the normal and wi in the cross-section. That needs
-// curves with "mode": "half_cylinder", whose normals are a cylinder's; "bcsdf_cylinder" and "ribbon" keep no side of h:
-// take "field": "far" there.
-// Measure: eval has the cosine in it, so it is the fibre's value as it is.
+// Frame: a curve's local frame has y along its derivative (assumed to be root to tip), and z along the normal. The
+// fibre's axes are (y, z, x), which is right-handed. h: sine of the angle from the normal to wi in the cross-section.
+// That requires curves with "mode": "half_cylinder", whose normals are a cylinder's. "bcsdf_cylinder" and "ribbon" do
+// not distinguish the sides of h: use "field": "far" there.
+// Measure: eval includes the cosine, so it returns the fibre's value unchanged.
 // Transport: wi is the known direction, wo the drawn one; both point away from the fibre. The model is not reciprocal.
 // Random numbers: four by next2D, a fifth for the far field.
 #pragma once
@@ -33,7 +33,7 @@ class MedullaBcsdf : public Bsdf {
   public:
     MedullaBcsdf() { _lobes = BsdfLobes(BsdfLobes::GlossyLobe | BsdfLobes::AnisotropicLobe); }
 
-    /// "preset" first, then what is given beside it; angles in degrees.
+    /// Reads "preset" first, then the fields that override it; angles in degrees.
     void fromJson(JsonPtr value, const Scene& scene) override {
         Bsdf::fromJson(value, scene);
         std::string preset, field;
@@ -59,7 +59,7 @@ class MedullaBcsdf : public Bsdf {
 
     void prepareForRender() override { prepare(_parameters, _whole_width); }
 
-    /// The same without a scene file.
+    /// Sets the material without a scene file.
     void prepare(const medulla::FurParameters<3>& parameters, bool whole_width) {
         _parameters = parameters, _whole_width = whole_width;
         const medulla::PackView pack = medulla::default_pack();

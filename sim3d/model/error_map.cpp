@@ -15,7 +15,7 @@ namespace {
 /// subtracted.
 constexpr std::size_t fine_theta = 180;
 
-/// What is compared of one scattered lobe.
+/// The parts of one scattered lobe that are compared.
 enum Measure : std::size_t {
     shape,
     over_phi = longitudinal_count,
@@ -60,7 +60,7 @@ DirectionalDensity density_of(const MeasuredLight& light, const std::vector<doub
     return d;
 }
 
-/// The truth's scattered lobe against the model's. The model is first scaled to the truth's energy, but for `whole`.
+/// The truth's scattered lobe against the model's. Except for `whole`, the model is first scaled to the truth's energy.
 Resampled compared(const MeasuredLight& truth, const FiveLobes& model, std::size_t channel) {
     Resampled r;
     const double energy = model.energy[channel][3] + model.energy[channel][4];
@@ -125,7 +125,7 @@ LightError error_of(const MeasuredLight& truth, const FiveLobes& model, const st
     return error;
 }
 
-/// Where R, TT and TRT leave, of the far field of one inclination.
+/// Where R, TT and TRT leave in the far field of one inclination.
 void add_directions(LightError& error, const MeasuredLight& truth) {
     for (std::size_t c = 0; c < error.channels.size(); ++c) {
         ChannelError& e = error.channels[c];

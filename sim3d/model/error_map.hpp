@@ -1,5 +1,5 @@
-// How far the five-lobe model of one material is from light in the fibre: energies and the scattered lobe over
-// inclination and offset, in the far field and for light from all directions, and what the difference comes from.
+// The error of the five-lobe model of one material against light in the fibre (the truth): energies and the scattered
+// lobe over inclination and offset, in the far field and for light from all directions, and the causes of the error.
 // Densities are energy per radian^2 of (theta_r, phi).
 #pragma once
 
@@ -18,14 +18,14 @@ struct ErrorMapOptions {
     std::uint64_t paths = 100000;  ///< per cell of the map
     std::uint64_t seed = 1;
     std::size_t inclinations = 11;        ///< theta_i = -pi/2 + k pi / (inclinations + 1), k = 1, 2, ..
-    std::size_t offsets = 8;              ///< ranges of |h|, all of one width
+    std::size_t offsets = 8;              ///< number of ranges of |h|, of equal width
     std::size_t theta_bins = 30;          ///< of the scattered lobe, a divisor of 180
     std::size_t phi_bins = 48;            ///< of the scattered lobe, even, a divisor of 1440
-    std::size_t batches = 16;             ///< that standard errors come from
+    std::size_t batches = 16;             ///< of paths, for standard errors
     std::function<void()> progress = {};  ///< called after each cell, from any thread, map_cells(options) times
 };
 
-/// Cells of the map, a smooth fibre and the model for every inclination.
+/// Number of steps of the computation: the cells of the map, and a smooth fibre and the model for every inclination.
 std::size_t map_cells(const ErrorMapOptions& options);
 
 /// One light and one colour channel: the truth against the model.
@@ -39,8 +39,8 @@ struct ChannelError {
     /// Square of the same with C^M at sigma_ms kappa, minus that of `cosine`: linear in the truth, so that its noise
     /// has no bias to subtract. Above 0, sigma_ms kappa / cos theta_t is nearer to the truth.
     Estimate sigma;
-    /// Of the far field of one inclination, R, TT, TRT: mean of theta_r + theta_i, and deviation of theta_r [radians];
-    /// errors of 0 and values of 0 where there is too little light. The model's are alpha_p and beta_p of Table 2.
+    /// Of R, TT, TRT in the far field of one inclination: mean of theta_r + theta_i, and deviation of theta_r
+    /// [radians]. Value and error are 0 where there is too little light. The model's are alpha_p and beta_p of Table 2.
     std::array<Estimate, 3> shift = {}, deviation = {};
 
     double model_scattered() const { return model[3] + model[4]; }
@@ -55,7 +55,7 @@ struct LightError {
 /// One light: the truth against the model's lobes of the same bins and channels.
 LightError light_error(const MeasuredLight& truth, const FiveLobes& model, double theta_i, const OffsetRange& offsets);
 
-/// What the error of the scattered light comes from, over light from all directions. Index 0: the far field, 1: single
+/// The causes of the error of the scattered light, for light from all directions. Index 0: the far field, 1: single
 /// ranges of offsets.
 struct Causes {
     std::array<std::array<Distance, longitudinal_count>, 2> shape;  ///< by Longitudinal
@@ -63,10 +63,10 @@ struct Causes {
     std::array<Distance, 2> product;                  ///< of the truth from the product of its own marginals
     std::array<Estimate, 2> sigma, sigma_over_theta;  ///< as ChannelError::sigma, of the lobe and of its marginal
     Distance cuticle;                                 ///< far field: of light in a smooth fibre from the truth
-    Estimate entering;   ///< model - truth of the scattered energy, because another share of light is scattered
-    Estimate absorbing;  ///< the rest of it, because another share of the scattered light is absorbed
+    Estimate entering;   ///< model - truth of the scattered energy, as far as the share of light that scatters differs
+    Estimate absorbing;  ///< the rest of it: the share of the scattered light that is absorbed differs
     Estimate cortex_length, medulla_length;                    ///< mean lengths of a path of scattered light [radii]
-    double model_cortex_length = 0, model_medulla_length = 0;  ///< those that Eq. 20 takes
+    double model_cortex_length = 0, model_medulla_length = 0;  ///< those that Eq. 20 assumes
     double R_smooth = 0;  ///< energy of R of a smooth cuticle by the exact Fresnel term
 };
 

@@ -12,7 +12,7 @@
 namespace medulla::sim3d {
 namespace {
 
-constexpr std::size_t fine = 1440;  // bins of N over phi before it is averaged over the bins asked for
+constexpr std::size_t fine = 1440;  // bins of N over phi, before the average over the requested bins
 constexpr std::size_t per_bin = 8;  // of M over theta_r, likewise
 
 /// Absorption coefficients of one channel.
@@ -223,7 +223,7 @@ DirectionalDensity folded(DirectionalDensity d) {
             }
     };
     fold(d.value);
-    d.error.clear();  // of values that were independent they would be others
+    d.error.clear();  // only errors of independent values could be combined
     return d;
 }
 

@@ -1,5 +1,6 @@
-// The truth in batches: light of the fast tracer, and sums of it over offsets and inclinations, such that every number
-// made of it has a standard error, and a squared distance no bias from the noise (jackknife over batches).
+// The truth in batches: light of the fast tracer, and its sums over offsets and inclinations. The jackknife over
+// batches gives every number derived from it a standard error, and removes the bias of the noise from squared
+// distances.
 #pragma once
 
 #include <array>
@@ -11,7 +12,7 @@
 
 namespace medulla::sim3d {
 
-/// What one colour channel sees.
+/// The light of one colour channel.
 struct ChannelLight {
     std::array<double, class_count> energy = {};  ///< by Class
     std::vector<double> scattered;                ///< density per radian^2 over (theta_r, phi), theta_r-major
@@ -24,20 +25,20 @@ struct ChannelLight {
 /// Means over some of the batches.
 struct LightMeans {
     std::vector<ChannelLight> channels;
-    std::array<double, class_count> white = {};    ///< energies, had nothing absorbed
+    std::array<double, class_count> white = {};    ///< energies without absorption
     double cortex_length = 0, medulla_length = 0;  ///< of scattered light, as FibreProfile counts them
 
     double white_scattered() const;
     void add(const LightMeans& other, double weight);
 };
 
-/// Means over all batches, and over all but one of them.
+/// Means over all batches, and over all but one.
 struct MeasuredLight {
     std::size_t theta_bins = 0, phi_bins = 0;  ///< of `scattered`
     LightMeans all;
     std::vector<LightMeans> without;  ///< [batch left out]
 
-    /// Adds `weight` times light of the same bins and batches that is independent of this, or the same.
+    /// Adds `weight` times other light of the same bins and batches, which is either independent of this or the same.
     void add(const MeasuredLight& other, double weight);
     /// Light at h and at -h: `scattered` becomes even in phi.
     void fold();
@@ -47,9 +48,9 @@ struct MeasuredLight {
 MeasuredLight measured(const FibreProfile& profile, const Fibre& fibre, const FibreOptions& options,
                        std::size_t theta_bins);
 
-/// f of all light: its value without the bias of first order in 1 / batches, all of it for a square, and its error.
+/// f of all light, with its standard error. The bias of first order in 1 / batches is removed; a square has no other.
 Estimate jackknife(const MeasuredLight& light, const std::function<double(const LightMeans&)>& f);
-/// The same for f of several lights; f(k) leaves out batch k of each, f(batches) none.
+/// The same for a function of several lights; f(k) leaves out batch k of each, f(batches) none.
 Estimate jackknife(std::size_t batches, const std::function<double(std::size_t)>& f);
 
 /// A relative L2 distance, sqrt(square). The noise of the truth is subtracted: `square` is negative by chance where

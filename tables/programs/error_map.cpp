@@ -19,7 +19,7 @@ namespace {
 
 constexpr double degrees = 180 / pi;
 
-/// A preset by its name, else a material file; throws Error where the simulation in three dimensions does not reach.
+/// A preset by its name, else a material file. Throws Error for a material outside the limits of the simulation.
 Material fibre_named(const std::string& fibre, bool is_preset) {
     if (!is_preset && !std::filesystem::exists(fibre)) {
         std::string names;

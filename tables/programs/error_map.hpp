@@ -23,7 +23,7 @@ struct ErrorMapArguments {
 
 void run_error_map(const ErrorMapArguments& args);
 
-/// What was compared, and by which work.
+/// The material that was compared, and the number of paths.
 struct ErrorMapTitle {
     Material material;
     std::uint64_t paths = 0, seed = 0;  ///< of each cell
@@ -31,7 +31,7 @@ struct ErrorMapTitle {
     std::string channel(std::size_t c) const;  ///< "", or "red", "green", "blue"
 };
 
-/// Every number of the page: docs/truth.md.
+/// Every number of the page (docs/truth.md).
 nlohmann::ordered_json error_map_json(const ErrorMapTitle& title, const sim3d::ErrorMap& map);
 
 /// The whole page, without links to other files.

@@ -37,7 +37,7 @@ std::string signed_text(double x, int digits = 4) {
     return zero ? text : (x < 0 ? "−" : "+") + text;
 }
 
-/// "± 0.0003": the one digit of an error that means something.
+/// "± 0.0003": an error, rounded to its one significant digit.
 std::string noise(double error) {
     if (error == 0) return "no noise";
     if (error < 1e-5) return "± &lt; 0.00001";
@@ -90,7 +90,7 @@ std::string energy_table(const ChannelError& e) {
            rows + "</tbody></table></div>";
 }
 
-/// The name of a row with what it means below.
+/// The name of a row, with its meaning below.
 std::string explained(const std::string& name, const std::string& why) {
     return why.empty() ? name : name + "<span class=\"why\">" + why + "</span>";
 }
@@ -100,7 +100,7 @@ std::string shape_row(const std::string& name, const Distance& far, const Distan
                        near ? distance_cell(*near) : std::string("<td class=\"quiet\">–</td>"));
 }
 
-/// What a difference of two squared errors says of the first.
+/// Which of two squared errors is smaller, in words.
 std::string nearer(const Estimate& difference) {
     if (std::abs(difference.value) <= 2 * difference.error) return "no difference beyond the noise";
     return difference.value < 0 ? "nearer to the truth" : "farther from the truth";

@@ -10,7 +10,7 @@ namespace medulla::tables {
 namespace {
 
 using Stops = std::array<Colour, 5>;
-// ColorBrewer's YlOrRd and RdBu with a lighter middle, by Cynthia Brewer: told apart with any colour vision.
+// ColorBrewer's YlOrRd and RdBu by Cynthia Brewer, with a lighter middle: distinguishable with any colour vision.
 constexpr Stops heat = {{{255, 250, 225}, {254, 204, 110}, {252, 141, 60}, {215, 48, 31}, {110, 0, 30}}};
 constexpr Stops balance = {{{20, 70, 140}, {110, 170, 215}, {247, 247, 247}, {240, 150, 110}, {160, 15, 35}}};
 

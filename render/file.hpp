@@ -17,6 +17,8 @@ std::string read_file(const std::string& path, std::uint64_t most);
 /// `name` beside the file `beside`, if it is not absolute.
 std::string path_beside(const std::string& beside, const std::string& name);
 
+bool ends_with(std::string_view text, std::string_view end);
+
 /// FNV-1a.
 std::uint64_t fingerprint(const void* bytes, std::size_t count);
 
@@ -25,8 +27,8 @@ void split(std::string_view text, std::vector<std::string_view>& words);
 /// All of `word` as a finite number; false where it is none. The same in every locale.
 bool read_number(std::string_view word, double& x);
 bool read_whole(std::string_view word, std::int64_t& x);
-/// As it may stand in a message: its first 40 characters, in ASCII.
-std::string printable(std::string_view text);
+/// As it may stand in a message: its first `most` characters, in ASCII.
+std::string printable(std::string_view text, std::size_t most = 40);
 
 /// A number of a file at these bytes, in the byte order of the file.
 template <class T>

@@ -9,6 +9,7 @@
 
 #include "medulla/fur_parameters.hpp"
 #include "render/error.hpp"
+#include "render/file.hpp"
 #include "render/image_file.hpp"
 #include "render/render.hpp"
 
@@ -60,10 +61,6 @@ double processor_seconds() {
     rusage use{};
     getrusage(RUSAGE_SELF, &use);
     return double(use.ru_utime.tv_sec) + 1e-6 * double(use.ru_utime.tv_usec);
-}
-
-bool ends_with(const std::string& text, const std::string& end) {
-    return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
 std::uint32_t mask_of(const std::vector<std::string>& names) {

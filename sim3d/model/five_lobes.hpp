@@ -45,7 +45,8 @@ struct FiveLobes {
 std::vector<FiveLobes> five_lobes(const Fibre& fibre, Reflectance reflectance, double theta_i,
                                   const std::vector<OffsetRange>& ranges, std::size_t theta_bins, std::size_t phi_bins);
 
-/// Mean of phi and -phi: light at h and at -h.
+/// Mean of phi and -phi, of rows over phi: light at h and at -h.
+void fold(std::vector<double>& rows, std::size_t phi_bins);
 DirectionalDensity folded(DirectionalDensity d);
 
 /// The same over phi alone, or over theta_r alone, as a density of one row or one column.

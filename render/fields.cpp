@@ -1,5 +1,7 @@
 #include "render/fields.hpp"
 
+#include "render/file.hpp"
+
 namespace medulla::render {
 namespace {
 
@@ -7,12 +9,6 @@ using nlohmann::json;
 constexpr int deepest_json = 8;
 constexpr double degree = 3.14159265358979323846 / 180;
 const json empty_list = json::array();
-
-std::string printable(std::string text) {
-    for (char& c : text)
-        if (c < ' ' || c > '~') c = '?';
-    return text;
-}
 
 std::string range_text(Range r) {
     if (r.high >= 1e9 && r.low <= -1e9) return "a number";
@@ -33,18 +29,17 @@ json parse_json(const std::string& text, const std::string& where) {
     try {
         return json::parse(text, shallow);
     } catch (const json::exception& error) {
-        throw Error("{}: expected JSON: {}", where, printable(error.what()));
+        throw Error("{}: expected JSON: {}", where, printable(error.what(), std::string::npos));
     }
 }
 
-std::string quoted(const json& value) {
-    return printable(value.dump(-1, ' ', true, json::error_handler_t::replace).substr(0, 40));
-}
+std::string quoted(const json& value) { return printable(value.dump(-1, ' ', true, json::error_handler_t::replace)); }
 
 double checked_number(const json& value, const std::string& place, Range range) {
     if (!value.is_number()) throw Error("{}: expected {}, found {}", place, range_text(range), quoted(value));
     const double x = value.get<double>();
-    const bool inside = x <= range.high && (range.open_low ? x > range.low : x >= range.low);
+    // What is kept is a float: 1e-99 is not above 0.
+    const bool inside = x <= range.high && (range.open_low ? float(x) > float(range.low) : x >= range.low);
     if (!inside) throw Error("{}: expected {}, found {:g}", place, range_text(range), x);
     return x;
 }

@@ -27,6 +27,10 @@ std::string path_beside(const std::string& beside, const std::string& name) {
     return (std::filesystem::path(beside).parent_path() / name).string();
 }
 
+bool ends_with(std::string_view text, std::string_view end) {
+    return text.size() > end.size() && text.substr(text.size() - end.size()) == end;
+}
+
 std::uint64_t fingerprint(const void* bytes, std::size_t count) {
     std::uint64_t h = 0xcbf29ce484222325u;
     for (std::size_t i = 0; i < count; ++i) h = (h ^ static_cast<const unsigned char*>(bytes)[i]) * 0x100000001b3u;
@@ -58,8 +62,8 @@ void split(std::string_view text, std::vector<std::string_view>& words) {
 bool read_number(std::string_view word, double& x) { return read(word, x) && std::isfinite(x); }
 bool read_whole(std::string_view word, std::int64_t& x) { return read(word, x); }
 
-std::string printable(std::string_view text) {
-    std::string shown(text.substr(0, 40));
+std::string printable(std::string_view text, std::size_t most) {
+    std::string shown(text.substr(0, most));
     for (char& c : shown)
         if (c < ' ' || c > '~') c = '?';
     return shown;

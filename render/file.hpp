@@ -17,6 +17,8 @@ std::string read_file(const std::string& path, std::uint64_t most);
 /// `name` relative to the folder of the file `beside`, if it is not absolute.
 std::string path_beside(const std::string& beside, const std::string& name);
 
+bool ends_with(std::string_view text, std::string_view end);
+
 /// FNV-1a.
 std::uint64_t fingerprint(const void* bytes, std::size_t count);
 
@@ -25,8 +27,8 @@ void split(std::string_view text, std::vector<std::string_view>& words);
 /// Parses all of `word` as a finite number, in every locale alike; false if it is not one.
 bool read_number(std::string_view word, double& x);
 bool read_whole(std::string_view word, std::int64_t& x);
-/// A text as quoted in a message: its first 40 characters, in ASCII.
-std::string printable(std::string_view text);
+/// A text as quoted in a message: its first `most` characters, in ASCII.
+std::string printable(std::string_view text, std::size_t most = 40);
 
 /// The number at these bytes of a file, in the file's byte order.
 template <class T>

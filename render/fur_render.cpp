@@ -1,20 +1,27 @@
 // fur-render: a scene file to a picture. docs/render.md.
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "medulla/fur_parameters.hpp"
 #include "render/error.hpp"
+#include "render/file.hpp"
 #include "render/image_file.hpp"
 #include "render/render.hpp"
 
 namespace {
 
 using namespace medulla::render;
+
+/// On standard error, where a message may be lost (fmt::print would throw).
+void say(const std::string& text) { std::fputs(text.c_str(), stderr); }
 
 enum class ProgressMode { automatic, bar, plain, none };
 
@@ -38,13 +45,9 @@ class Progress {
         const double gone = std::chrono::duration<double>(now - start_).count();
         const double left = share > first_ ? gone * (1 - share) / (share - first_) : 0;
         const std::string text = fmt::format("{:3.0f} %, {:.0f} s, {:.0f} s left", 100 * share, gone, left);
-        if (mode_ == ProgressMode::plain) {
-            fmt::print(stderr, "{}\n", text);
-            return;
-        }
         const int full = int(40 * share);
-        fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {}   ", "", full, "", 40 - full, text);
-        std::fflush(stderr);
+        say(mode_ == ProgressMode::plain ? text + "\n"
+                                         : fmt::format("\r[{:#<{}}{:.<{}}] {}   ", "", full, "", 40 - full, text));
     }
 
   private:
@@ -60,10 +63,6 @@ double processor_seconds() {
     rusage use{};
     getrusage(RUSAGE_SELF, &use);
     return double(use.ru_utime.tv_sec) + 1e-6 * double(use.ru_utime.tv_usec);
-}
-
-bool ends_with(const std::string& text, const std::string& end) {
-    return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
 std::uint32_t mask_of(const std::vector<std::string>& names) {
@@ -104,9 +103,9 @@ void run(const Options& o, const CLI::App& app) {
     const bool open_ended = options.seconds > 0 || options.error > 0;
     options.samples = o.samples > 0 ? std::uint32_t(o.samples) : open_ended ? 1u << 20 : 64;
     options.unfinished = o.out.front() + ".unfinished";
-    options.key = fmt::format("{}\n{} {} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
+    options.key = fmt::format("{}\n{} {} {} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
                               scene.picture.height, o.field, options.path.lobes, o.density, options.path.clamp,
-                              options.seed * 2 + std::uint32_t(options.path.sample_lights), o.layers, scene.text);
+                              options.seed, options.path.sample_lights, o.layers, scene.text);
 
     const auto start = std::chrono::steady_clock::now();
     const PathTracer tracer(scene, options.path);
@@ -211,9 +210,11 @@ int main(int argc, char** argv) {
     app.add_option("--progress", o.progress, "auto, bar, plain or none")->transform(CLI::CheckedTransformer(modes));
     app.add_flag("--json", o.json, "one JSON object on standard output");
     app.add_flag("--stats", o.render.stats, "rays, speed and shares of the time");
+    for (int stream = 0; stream < 3; ++stream)  // one that is closed: no picture gets its number
+        if (fcntl(stream, F_GETFD) < 0 && open("/dev/null", O_RDWR) != stream) return 1;
     for (int i = 1; i < argc; ++i)
         if (argv[i][0] == 0) {  // CLI11 2.1 hangs on some of them
-            fmt::print(stderr, "fur-render: option number {} is empty\n", i);
+            say(fmt::format("fur-render: option number {} is empty\n", i));
             return 2;
         }
     try {
@@ -227,13 +228,14 @@ int main(int argc, char** argv) {
     } catch (const CLI::Success& e) {
         return app.exit(e);
     } catch (const CLI::ParseError& e) {
-        fmt::print(stderr, "fur-render: {}\n", e.what());
+        say(fmt::format("fur-render: {}\n", e.what()));
         return 2;
     }
     try {
         run(o, app);
+        if (std::fflush(stdout) != 0) throw Error("standard output: cannot be written: {}", std::strerror(errno));
     } catch (const std::exception& e) {
-        fmt::print(stderr, "fur-render: {}\n", e.what());
+        say(fmt::format("fur-render: {}\n", e.what()));
         return 1;
     }
     return 0;

@@ -1,7 +1,5 @@
 #include "render/geometry.hpp"
 
-#include <atomic>
-
 #include "render/error.hpp"
 
 namespace medulla::render {
@@ -48,12 +46,11 @@ bool count_memory(void* user, ssize_t bytes, bool) {
 }  // namespace
 
 Geometry::Geometry(const Scene& scene) {
-    device_ = rtcNewDevice(nullptr);
+    device_.reset(rtcNewDevice(nullptr));
     if (device_ == nullptr) throw Error("embree: no device ({})", int(rtcGetDeviceError(nullptr)));
-    std::atomic<std::int64_t> bytes{0};
-    rtcSetDeviceMemoryMonitorFunction(device_, count_memory, &bytes);
-    scene_ = rtcNewScene(device_);
-    rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
+    rtcSetDeviceMemoryMonitorFunction(device_.get(), count_memory, &bytes_);
+    scene_.reset(rtcNewScene(device_.get()));
+    rtcSetSceneBuildQuality(scene_.get(), RTC_BUILD_QUALITY_HIGH);
     for (const Object& object : scene.objects)
         for (const Layer& layer : object.coat) {
             strands_.push_back(grow(object.shape, layer));
@@ -66,20 +63,14 @@ Geometry::Geometry(const Scene& scene) {
     if (scene.ground.present) meshes_.push_back(mesh_of(scene.ground));
     for (Strands& strands : strands_) add(strands);
     for (const Mesh& mesh : meshes_) add(mesh);
-    rtcCommitScene(scene_);
-    rtcSetDeviceMemoryMonitorFunction(device_, nullptr, nullptr);
-    bytes_ = bytes;
-    if (const RTCError error = rtcGetDeviceError(device_); error != RTC_ERROR_NONE)
-        throw Error("embree: error {} while building ({} MB)", int(error), bytes_ >> 20);
-}
-
-Geometry::~Geometry() {
-    if (scene_ != nullptr) rtcReleaseScene(scene_);
-    if (device_ != nullptr) rtcReleaseDevice(device_);
+    rtcCommitScene(scene_.get());
+    if (const RTCError error = rtcGetDeviceError(device_.get()); error != RTC_ERROR_NONE)
+        throw Error("embree: error {} while building ({} MB)", int(error), bytes() >> 20);
 }
 
 void Geometry::add(Strands& strands) {
-    RTCGeometry curves = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE);
+    const Owned<RTCGeometry> geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE));
+    RTCGeometry curves = geometry.get();
     rtcSetSharedGeometryBuffer(curves, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, strands.first_point.data(), 0,
                                sizeof(std::uint32_t), strands.first_point.size());
     strands.points.reserve(strands.points.size() + 1);  // Embree reads 16 bytes at the last point's address and on
@@ -89,12 +80,12 @@ void Geometry::add(Strands& strands) {
     rtcSetGeometryIntersectFilterFunction(curves, filter);
     rtcSetGeometryOccludedFilterFunction(curves, filter);
     rtcCommitGeometry(curves);
-    rtcAttachGeometry(scene_, curves);
-    rtcReleaseGeometry(curves);
+    rtcAttachGeometry(scene_.get(), curves);
 }
 
 void Geometry::add(const Mesh& mesh) {
-    RTCGeometry triangles = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+    const Owned<RTCGeometry> geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+    RTCGeometry triangles = geometry.get();
     auto* points = static_cast<Vec3*>(rtcSetNewGeometryBuffer(triangles, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                               sizeof(Vec3), mesh.positions.size()));
     auto* index = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
@@ -105,8 +96,7 @@ void Geometry::add(const Mesh& mesh) {
     rtcSetGeometryIntersectFilterFunction(triangles, filter);
     rtcSetGeometryOccludedFilterFunction(triangles, filter);
     rtcCommitGeometry(triangles);
-    rtcAttachGeometry(scene_, triangles);
-    rtcReleaseGeometry(triangles);
+    rtcAttachGeometry(scene_.get(), triangles);
 }
 
 Hit Geometry::nearest(const Ray& ray) const {
@@ -116,7 +106,7 @@ Hit Geometry::nearest(const Ray& ray) const {
     RTCRayHit query;
     query.ray = embree_ray(ray, std::numeric_limits<float>::infinity());
     query.hit.geomID = nothing;
-    rtcIntersect1(scene_, &context.embree, &query);
+    rtcIntersect1(scene_.get(), &context.embree, &query);
     return {query.ray.tfar, query.hit.geomID, query.hit.primID, query.hit.u, query.hit.v};
 }
 
@@ -125,7 +115,7 @@ bool Geometry::blocked(const Ray& ray, float distance) const {
     rtcInitIntersectContext(&context.embree);
     context.start = ray.start;
     RTCRay query = embree_ray(ray, distance);
-    rtcOccluded1(scene_, &context.embree, &query);
+    rtcOccluded1(scene_.get(), &context.embree, &query);
     return query.tfar < 0;
 }
 

@@ -8,8 +8,10 @@
 
 #include <embree3/rtcore.h>
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "render/groom.hpp"
@@ -55,9 +57,6 @@ struct SkinHit {
 class Geometry {
   public:
     explicit Geometry(const Scene& scene);
-    ~Geometry();
-    Geometry(const Geometry&) = delete;
-    Geometry& operator=(const Geometry&) = delete;
 
     Hit nearest(const Ray& ray) const;
     bool blocked(const Ray& ray, float distance) const;
@@ -72,13 +71,22 @@ class Geometry {
     std::size_t bytes() const { return std::size_t(bytes_); }  ///< that Embree has allocated
 
   private:
+    struct Release {
+        void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+        void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+        void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+    };
+    template <class Handle>
+    using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
+
     void add(Strands& strands);
     void add(const Mesh& mesh);
+    // Embree reads the strands and counts its bytes until the device is released: both outlive it.
     std::vector<Strands> strands_;
     std::vector<Mesh> meshes_;
-    RTCDevice device_ = nullptr;
-    RTCScene scene_ = nullptr;
-    std::int64_t bytes_ = 0;
+    std::atomic<std::int64_t> bytes_{0};
+    Owned<RTCDevice> device_;
+    Owned<RTCScene> scene_;
 };
 
 }  // namespace medulla::render

@@ -1,42 +1,59 @@
 #include "render/groom.hpp"
 
-#include <unordered_map>
+#include "render/error.hpp"
 
 namespace medulla::render {
 namespace {
 
-/// Points in a grid, whose cells are as wide as the greatest distance of a query.
+/// Points in a grid, whose cells are as wide as the greatest distance of a query. A hash table of lists in one array: most
+/// cells that a query visits are empty, and cost one read.
 class PointGrid {
   public:
-    explicit PointGrid(float cell) : scale_(1 / cell) {}
+    /// @param expected number of points
+    PointGrid(float cell, std::size_t expected) : scale_(1 / double(cell)) {
+        while (std::size_t(1) << (64 - shift_) < 2 * expected) --shift_;
+        first_.assign(std::size_t(1) << (64 - shift_), none);
+    }
 
-    void add(Vec3 p, std::uint32_t index) { cells_[key(cell(p.x), cell(p.y), cell(p.z))].push_back({p, index}); }
+    /// Points are numbered as they come.
+    void add(Vec3 p) {
+        const std::uint64_t k = key(cell(p.x), cell(p.y), cell(p.z));
+        entries_.push_back({p, first_[list(k)], k});
+        first_[list(k)] = std::uint32_t(entries_.size() - 1);
+    }
 
-    /// Calls visit(point, index) for every point within a cell's width of p, and for some farther ones.
+    /// Calls visit(point, number) for every point within a cell's width of p and for some farther ones, those of its own
+    /// cell first, until one returns false.
     template <class Visit>
     void around(Vec3 p, Visit&& visit) const {
         const std::int64_t x = cell(p.x), y = cell(p.y), z = cell(p.z);
-        for (std::int64_t i = x - 1; i <= x + 1; ++i)
-            for (std::int64_t j = y - 1; j <= y + 1; ++j)
-                for (std::int64_t k = z - 1; k <= z + 1; ++k) {
-                    const auto at = cells_.find(key(i, j, k));
-                    if (at == cells_.end()) continue;
-                    for (const Entry& entry : at->second) visit(entry.point, entry.index);
+        for (const int i : {0, -1, 1})
+            for (const int j : {0, -1, 1})
+                for (const int k : {0, -1, 1}) {
+                    const std::uint64_t cell = key(x + i, y + j, z + k);
+                    for (std::uint32_t at = first_[list(cell)]; at != none; at = entries_[at].next)
+                        if (entries_[at].cell == cell && !visit(entries_[at].point, at)) return;
                 }
     }
 
   private:
+    static constexpr std::uint32_t none = 0xffffffffu;
     struct Entry {
         Vec3 point;
-        std::uint32_t index;
+        std::uint32_t next;
+        std::uint64_t cell;
     };
-    std::int64_t cell(float x) const { return std::int64_t(std::floor(double(x) * double(scale_))); }
+    std::int64_t cell(float x) const { return std::int64_t(std::floor(double(x) * scale_)); }
     static std::uint64_t key(std::int64_t x, std::int64_t y, std::int64_t z) {
         constexpr std::uint64_t low = (1 << 21) - 1;
         return (std::uint64_t(x) & low) << 42 | (std::uint64_t(y) & low) << 21 | (std::uint64_t(z) & low);
     }
-    float scale_;
-    std::unordered_map<std::uint64_t, std::vector<Entry>> cells_;
+    std::size_t list(std::uint64_t key) const { return std::size_t(key * 0x9e3779b97f4a7c15u >> shift_); }  // Fibonacci
+
+    double scale_;
+    int shift_ = 63;
+    std::vector<std::uint32_t> first_;  ///< of each list
+    std::vector<Entry> entries_;
 };
 
 /// Smooth noise in [-1, 1]: random values at integer coordinates, interpolated.
@@ -84,7 +101,7 @@ std::vector<Vec3> combed(const SurfacePoint& root, const Layer& layer, float len
 
 std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::size_t count, std::uint32_t seed) {
     Sequence random(seed);
-    PointGrid grid(distance);
+    PointGrid grid(distance, count);
     std::vector<SurfacePoint> points;
     std::size_t placed = 0;
     for (std::size_t tries = 0; placed < count && tries < 30 * count; ++tries) {
@@ -92,10 +109,10 @@ std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::
         bool free = true;
         grid.around(p.position, [&](Vec3 q, std::uint32_t) {
             const Vec3 d = q - p.position;
-            free = free && dot(d, d) >= distance * distance;
+            return free = dot(d, d) >= distance * distance;
         });
         if (!free) continue;
-        grid.add(p.position, std::uint32_t(placed++));
+        grid.add(p.position), ++placed;
         if (p.fur > 0) points.push_back(p);  // bald skin still counts towards the density
     }
     return points;
@@ -103,17 +120,23 @@ std::vector<SurfacePoint> poisson_disc(const Shape& shape, float distance, std::
 
 Strands grow(const Shape& shape, const Layer& layer) {
     const double wanted = double(layer.density) * double(area_of(shape));
+    const double most_strands = double(0xffffffffu) / (layer.segments + 3);  // control points, which Embree counts
+    if (!(wanted < most_strands))
+        throw Error("coat: expected at most {:.3g} strands, found {:.3g}", most_strands, wanted);
     const std::size_t count = std::max<std::size_t>(1, std::size_t(wanted + 0.5));
     // Saturated dart throwing reaches density x distance^2 = 0.69; at 0.53 few darts are lost.
     const float distance = std::sqrt(0.53f / layer.density);
     const std::vector<SurfacePoint> roots = poisson_disc(shape, distance, count, layer.seed);
 
     std::vector<std::vector<Vec3>> guides;
-    PointGrid guide_grid(layer.clump_size > 0 ? 2 * layer.clump_size : 1);
-    if (layer.clump_size > 0 && layer.clump_strength > 0) {
-        const std::size_t most = std::size_t(1 + double(area_of(shape)) / double(layer.clump_size * layer.clump_size));
+    const bool clumps = layer.clump_size > 0 && layer.clump_strength > 0;
+    // Clumps of less than a strand each would be of no effect.
+    const double most_guides = 1 + double(area_of(shape)) / (double(layer.clump_size) * double(layer.clump_size));
+    const std::size_t most = clumps ? std::size_t(std::min(most_guides, double(count))) : 0;
+    PointGrid guide_grid(clumps ? 2 * layer.clump_size : 1, most);
+    if (clumps) {
         for (const SurfacePoint& centre : poisson_disc(shape, layer.clump_size, most, layer.seed ^ 0x5bd1e995u)) {
-            guide_grid.add(centre.position, std::uint32_t(guides.size()));
+            guide_grid.add(centre.position);
             Sequence random(hash(layer.seed ^ 0x7f4a7c15u, std::uint32_t(guides.size())));
             const float a = random.even(), b = random.even();
             guides.push_back(combed(centre, layer, centre.fur * layer.length, a, b));
@@ -140,6 +163,7 @@ Strands grow(const Shape& shape, const Layer& layer) {
             guide_grid.around(roots[i].position, [&](Vec3 p, std::uint32_t index) {
                 const Vec3 d = p - roots[i].position;
                 if (dot(d, d) < least) least = dot(d, d), nearest = index;
+                return true;
             });
             for (std::size_t k = 1; least < 1e30f && k < line.size(); ++k) {
                 const float s = float(k) / float(layer.segments), pull = layer.clump_strength * std::pow(s, 1.5f);

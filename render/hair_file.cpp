@@ -77,11 +77,8 @@ Strands read_hair(const std::string& path, const std::string& bytes, const Stran
 }
 
 Strands read_strands(const std::string& path, const std::string& bytes, const StrandFile& how) {
-    const auto ends_with = [&](const std::string& end) {
-        return path.size() > end.size() && path.compare(path.size() - end.size(), end.size(), end) == 0;
-    };
-    if (ends_with(".hair")) return read_hair(path, bytes, how);
-    if (ends_with(".pbrt")) return read_pbrt_curves(path, bytes, how);
+    if (ends_with(path, ".hair")) return read_hair(path, bytes, how);
+    if (ends_with(path, ".pbrt")) return read_pbrt_curves(path, bytes, how);
     throw Error("{}: expected a name that ends in .hair or .pbrt", path);
 }
 

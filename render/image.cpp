@@ -38,10 +38,6 @@ class Memory : public Imf::IStream {
     std::uint64_t at_ = 0;
 };
 
-bool ends_with(const std::string& text, const std::string& end) {
-    return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
 }  // namespace
 
 Image read_exr(const std::string& path, const std::string& bytes) {
@@ -74,7 +70,7 @@ Image read_exr(const std::string& path, const std::string& bytes) {
         if (!colour)
             for (Rgb& p : image.pixels) p = {p.x, p.x, p.x};
     } catch (const std::exception& error) {
-        throw Error("{}: expected an OpenEXR picture, found {}", path, printable(error.what()));
+        throw Error("{}: expected an OpenEXR picture, found {}", path, printable(error.what(), std::string::npos));
     }
     return image;
 }
@@ -177,7 +173,7 @@ Image read_png(const std::string& path, const std::string& bytes, bool linear) {
         if (done != 0) return;
         const std::string message = png.message;
         png_image_free(&png);
-        throw Error("{}: expected a PNG picture, found {}", path, printable(message));
+        throw Error("{}: expected a PNG picture, found {}", path, printable(message, std::string::npos));
     };
     check(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()));
     if (std::int64_t(png.width) > most_pixels / std::int64_t(png.height)) {

@@ -24,7 +24,10 @@ float srgb(float x) { return x <= 0.0031308f ? 12.92f * x : 1.055f * std::pow(x,
 }  // namespace
 
 // Narkowicz 2015's fit of the ACES curve: a toe, a shoulder, 0.8 at 1.
-float filmic(float x) { return std::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f); }
+float filmic(float x) {
+    x = std::min(x, 8.0f);  // the curve is 1 from 7.25 on; squares of great radiances are infinite
+    return std::clamp(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 0.0f, 1.0f);
+}
 
 void write_png(const Film& film, const Picture& picture, const std::string& path) {
     std::vector<std::uint8_t> bytes(3 * film.pixels.size());
@@ -46,7 +49,9 @@ void write_png(const Film& film, const Picture& picture, const std::string& path
     std::FILE* file = std::fopen(path.c_str(), "wb");
     if (file == nullptr) throw Error("{}: cannot be written: {}", path, std::strerror(errno));
     const bool written = png_image_write_to_stdio(&image, file, 0, bytes.data(), 0, nullptr) != 0;
-    if (std::fclose(file) != 0 || !written) throw Error("{}: cannot be written: {}", path, image.message);
+    const bool closed = std::fclose(file) == 0;
+    if (!written || !closed)
+        throw Error("{}: cannot be written: {}", path, written ? std::strerror(errno) : image.message);
 }
 
 namespace {

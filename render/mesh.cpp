@@ -56,10 +56,6 @@ Mesh mesh_of(const Polygons& polygons, const MeshFile& how) {
     return mesh;
 }
 
-bool ends_with(const std::string& text, const std::string& end) {
-    return text.size() > end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
 }  // namespace
 
 SurfacePoint Mesh::at(std::size_t triangle, float u, float v) const {

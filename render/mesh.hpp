@@ -45,6 +45,7 @@ struct MeshFile {
     bool clockwise = false;  ///< faces seen from outside
 };
 
+inline constexpr std::size_t most_corners = 1024;  ///< of one polygon: clipping ears takes the cube of it at worst
 inline constexpr std::uint64_t greatest_mesh_file = std::uint64_t(1) << 32;
 
 /// The format is chosen by the end of the file's name. Throws Error: file, place, expected, found.

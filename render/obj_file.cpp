@@ -10,7 +10,6 @@ namespace {
 const std::set<std::string_view> skipped{"vt",        "g",     "o",      "s",        "usemtl",  "mtllib",
                                          "l",         "p",     "usemap", "maplib",   "lod",     "shadow_obj",
                                          "trace_obj", "bevel", "mg",     "c_interp", "d_interp"};
-constexpr std::size_t most_corners = 1024;  // of one polygon: clipping ears takes the cube of it at worst
 
 }  // namespace
 
@@ -58,7 +57,7 @@ Polygons read_obj(const std::string& path, const std::string& bytes) {
             for (std::size_t k = 1; k < words.size(); ++k) {
                 const auto index = [&](std::string_view number, std::size_t count) {
                     std::int64_t i;  // from 1, or from the end below 0
-                    if (!read_whole(number, i) || i == 0 || i > std::int64_t(count) || -i > std::int64_t(count))
+                    if (!read_whole(number, i) || i == 0 || i > std::int64_t(count) || i < -std::int64_t(count))
                         fail(fmt::format("a number of the {} so far", count), words[k]);
                     return std::uint32_t(i > 0 ? i - 1 : std::int64_t(count) + i);
                 };

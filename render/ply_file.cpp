@@ -8,8 +8,6 @@
 namespace medulla::render {
 namespace {
 
-constexpr std::size_t most_corners = 1024;  // of one polygon, as in obj_file.cpp
-
 struct Type {
     const char *name, *other_name;
     std::size_t bytes;
@@ -88,6 +86,8 @@ class PlyReader {
             } else if (words[0] == "element") {
                 std::int64_t count = 0;
                 if (words.size() != 3 || !read_whole(words[2], count) || count < 0) fail("element NAME COUNT");
+                for (const Element& e : elements_)
+                    if (e.name == words[1]) fail("each element once");
                 elements_.push_back({std::string(words[1]), std::uint64_t(count), {}});
             } else if (words[0] == "property") {
                 if (elements_.empty()) fail("an element before its properties");

@@ -23,7 +23,7 @@ Report render(const PathTracer& tracer, const RenderOptions& options, Film& film
               const std::function<void(double)>& progress) {
     Report report;
     if (options.resume) load(film, options.key, options.unfinished);
-    report.begun_at = film.samples;
+    const std::uint64_t nonfinite_before = film.nonfinite;
     const int columns = (film.width + tile - 1) / tile, rows = (film.height + tile - 1) / tile, tiles = columns * rows;
     const int threads = options.threads > 0 ? options.threads : int(std::max(1u, std::thread::hardware_concurrency()));
     const auto start = std::chrono::steady_clock::now();
@@ -63,18 +63,16 @@ Report render(const PathTracer& tracer, const RenderOptions& options, Film& film
         work();
         for (std::thread& thread : others) thread.join();
         film.samples = last;
+        film.nonfinite = nonfinite_before + report.counts.nonfinite;
 
         const double now = since(start);
         if (options.seconds > 0 && now >= options.seconds) break;
         if (options.error > 0 && film.samples >= 2 * samples_per_pass && film.error() <= options.error) break;
         if (!options.unfinished.empty() && now - saved > seconds_between_saves && film.samples < options.samples) {
-            Film kept = film;
-            kept.nonfinite += report.counts.nonfinite;
-            save(kept, options.key, options.unfinished);
+            save(film, options.key, options.unfinished);
             saved = now;
         }
     }
-    film.nonfinite += report.counts.nonfinite;
     report.seconds = since(start);
     return report;
 }

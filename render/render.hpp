@@ -24,8 +24,7 @@ struct RenderOptions {
 
 struct Report {
     Counts counts;
-    double seconds = 0;          ///< rendering alone
-    std::uint32_t begun_at = 0;  ///< samples per pixel that an earlier run had done
+    double seconds = 0;  ///< rendering alone
 };
 
 /// Samples per pixel of a pass, after which time and error are checked.

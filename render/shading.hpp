@@ -122,7 +122,8 @@ class Shading {
             low.sigma_ms = std::min(low.sigma_ms, p.sigma_ms), high.sigma_ms = std::max(high.sigma_ms, p.sigma_ms);
             low.kappa = std::min(low.kappa, p.kappa), high.kappa = std::max(high.kappa, p.kappa);
             low.g = std::min(low.g, p.g), high.g = std::max(high.g, p.g);
-            high.eta = std::min(high.eta, p.eta);
+            low.eta = std::max(low.eta, p.eta),
+            high.eta = std::min(high.eta, p.eta);  // the longest way is of the least
         }
         for (const auto& texture : coat.textures) {
             float least, most;

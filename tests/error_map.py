@@ -5,6 +5,7 @@ import json
 import math
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -170,6 +171,8 @@ class ErrorMap(unittest.TestCase):
         done = self.run_in("--fibre", "hair.json", "--error-map", "hair.html", "--paths", 160, "--progress", "none")
         self.assertRegex(done.stdout, r"grey: R 0\.\d+ \+- 0\.\d+, model 0\.\d+; next to no scattered light\n")
         self.assertIn("Nothing scatters.", Page(self.read("hair.html")).text)
+        # Two curves of scattered light and two of R at 11 inclinations; none of the error of a lobe that is not there.
+        self.assertEqual(self.read("hair.html").count("<circle"), 4 * 11)
 
     def fails(self, status, *args, parts=()):
         before = {name: self.read(name) for name in os.listdir(self.folder.name)}
@@ -179,6 +182,19 @@ class ErrorMap(unittest.TestCase):
         for part in parts:
             self.assertIn(part, done.stderr)
         self.assertEqual({name: self.read(name) for name in os.listdir(self.folder.name)}, before)
+
+    def test_a_signal_ends_it_with_one_line(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            words = ["--fibre", "m.json", "--error-map", "never.html", "--paths", 1000000, "--progress", "plain"]
+            with subprocess.Popen([os.path.join(BIN, "medulla-precompute"), *map(str, words)], stdout=subprocess.PIPE,
+                                  stderr=subprocess.PIPE, text=True, cwd=self.folder.name, env=CLEAN) as job:
+                first = job.stderr.readline()  # of the progress: the work has begun
+                job.send_signal(number)
+                out, rest = job.communicate()
+            self.assertEqual((job.returncode, out), (128 + number, ""))
+            self.assertRegex(first, r"^error map: ")
+            self.assertEqual(rest.splitlines()[-1], "medulla-precompute: interrupted: no page written")
+            self.assertNotIn("never.html", " ".join(os.listdir(self.folder.name)))
 
     def test_bad_input(self):
         page = ["--error-map", "never.html"]

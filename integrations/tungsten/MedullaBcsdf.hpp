@@ -10,6 +10,8 @@
 #pragma once
 
 #include <memory>
+#include <stdexcept>
+#include <string>
 
 #include "bsdfs/Bsdf.hpp"
 #include "io/JsonObject.hpp"
@@ -37,9 +39,11 @@ class MedullaBcsdf : public Bsdf {
     void fromJson(JsonPtr value, const Scene& scene) override {
         Bsdf::fromJson(value, scene);
         std::string preset, field;
-        if (value.getField("preset", preset))
-            if (const medulla::FurPreset* found = medulla::find_preset(preset.c_str()))
-                _parameters = medulla::parameters_of<3>(*found);
+        if (value.getField("preset", preset)) {
+            const medulla::FurPreset* found = medulla::find_preset(preset.c_str());
+            if (found == nullptr) value.parseError("medulla: no preset \"" + preset + "\"");
+            _parameters = medulla::parameters_of<3>(*found);
+        }
         value.getField("eta", _parameters.eta);
         value.getField("kappa", _parameters.kappa);
         value.getField("layers", _parameters.layers);
@@ -54,7 +58,10 @@ class MedullaBcsdf : public Bsdf {
         Vec3f sigma_ca;
         if (value.getField("sigma_ca", sigma_ca))
             for (int c = 0; c < 3; ++c) _parameters.sigma_ca[c] = sigma_ca[c];
-        if (value.getField("field", field)) _whole_width = field == "far";
+        if (value.getField("field", field)) {
+            if (field != "near" && field != "far") value.parseError("medulla: no field \"" + field + "\"");
+            _whole_width = field == "far";
+        }
     }
 
     void prepareForRender() override { prepare(_parameters, _whole_width); }
@@ -69,6 +76,8 @@ class MedullaBcsdf : public Bsdf {
         void* aligned = _memory.get();
         std::align(64, bytes, aligned, room);
         _fibre = medulla::make_fibre(_parameters, medulla::make_tables(pack, ranges, aligned, bytes).tables);
+        if (_fibre.status != medulla::FibreStatus::ok)
+            throw std::runtime_error(std::string("medulla: ") + medulla::describe(_fibre.status));
     }
 
     Vec3f eval(const SurfaceScatterEvent& event) const override {

@@ -214,15 +214,16 @@ std::vector<FiveLobes> five_lobes(const Fibre& f, Reflectance reflectance, doubl
     return all;
 }
 
+void fold(std::vector<double>& rows, std::size_t phi_bins) {
+    for (std::size_t row = 0; row < rows.size(); row += phi_bins)
+        for (std::size_t b = 0; b < phi_bins / 2; ++b) {
+            double &one = rows[row + b], &other = rows[row + phi_bins - 1 - b];
+            one = other = 0.5 * (one + other);
+        }
+}
+
 DirectionalDensity folded(DirectionalDensity d) {
-    const auto fold = [&](std::vector<double>& x) {
-        for (std::size_t row = 0; row + d.phi_bins <= x.size(); row += d.phi_bins)
-            for (std::size_t b = 0; b < d.phi_bins / 2; ++b) {
-                double &one = x[row + b], &other = x[row + d.phi_bins - 1 - b];
-                one = other = 0.5 * (one + other);
-            }
-    };
-    fold(d.value);
+    fold(d.value, d.phi_bins);
     d.error.clear();  // only errors of independent values could be combined
     return d;
 }

@@ -47,7 +47,8 @@ struct FiveLobes {
 std::vector<FiveLobes> five_lobes(const Fibre& fibre, Reflectance reflectance, double theta_i,
                                   const std::vector<OffsetRange>& ranges, std::size_t theta_bins, std::size_t phi_bins);
 
-/// The mean over phi and -phi, which is light at h and at -h.
+/// The mean over phi and -phi of every row, which is light at h and at -h.
+void fold(std::vector<double>& rows, std::size_t phi_bins);
 DirectionalDensity folded(DirectionalDensity d);
 
 /// The marginal over phi, or over theta_r, as a density of one row or one column.

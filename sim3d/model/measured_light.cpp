@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "medulla/config.hpp"
+#include "sim3d/model/five_lobes.hpp"
 
 namespace medulla::sim3d {
 
@@ -44,16 +45,11 @@ void MeasuredLight::add(const MeasuredLight& other, double weight) {
 }
 
 void MeasuredLight::fold() {
-    const auto fold = [&](LightMeans& light) {
-        for (ChannelLight& channel : light.channels)
-            for (std::size_t row = 0; row < channel.scattered.size(); row += phi_bins)
-                for (std::size_t b = 0; b < phi_bins / 2; ++b) {
-                    double &one = channel.scattered[row + b], &other = channel.scattered[row + phi_bins - 1 - b];
-                    one = other = 0.5 * (one + other);
-                }
+    const auto fold_all = [&](LightMeans& light) {
+        for (ChannelLight& channel : light.channels) sim3d::fold(channel.scattered, phi_bins);
     };
-    fold(all);
-    for (LightMeans& light : without) fold(light);
+    fold_all(all);
+    for (LightMeans& light : without) fold_all(light);
 }
 
 namespace {

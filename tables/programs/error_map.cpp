@@ -1,9 +1,11 @@
 #include "tables/programs/error_map.hpp"
 
 #include <omp.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <vector>
 
@@ -46,6 +48,31 @@ Material fibre_named(const std::string& fibre, bool is_preset) {
     return material;
 }
 
+/// In its lifetime SIGINT and SIGTERM end the process with a message: until the page is written there is nothing to
+/// keep.
+class EndedBySignals {
+  public:
+    EndedBySignals() {
+        struct sigaction action = {};
+        action.sa_handler = [](int number) {
+            constexpr char text[] = "medulla-precompute: interrupted: no page written\n";
+            message(STDERR_FILENO, text, sizeof text - 1);
+            ::_exit(128 + number);
+        };
+        ::sigaction(SIGINT, &action, &old_[0]);
+        ::sigaction(SIGTERM, &action, &old_[1]);
+    }
+    ~EndedBySignals() {
+        ::sigaction(SIGINT, &old_[0], nullptr);
+        ::sigaction(SIGTERM, &old_[1], nullptr);
+    }
+    EndedBySignals(const EndedBySignals&) = delete;
+    EndedBySignals& operator=(const EndedBySignals&) = delete;
+
+  private:
+    struct sigaction old_[2];
+};
+
 }  // namespace
 
 void run_error_map(const ErrorMapArguments& args) {
@@ -58,6 +85,7 @@ void run_error_map(const ErrorMapArguments& args) {
     options.paths = args.paths, options.seed = args.seed;
     sim3d::ErrorMap map;
     {
+        const EndedBySignals signals;
         Progress progress(args.progress, "error map", sim3d::map_cells(options));
         options.progress = [&] { progress.add(1); };
         const auto model =

@@ -285,7 +285,9 @@ std::string far_field(const sim3d::ErrorMap& map, std::size_t channel) {
                 distance_cell(e.shape) + distance_cell(e.cosine) + "</tr>";
         const double y[] = {e.scattered.value, e.model_scattered(), e.truth[0].value,
                             e.model[0],        e.shape.value(),     e.cosine.value()};
-        for (std::size_t k = 0; k < 6; ++k) curves[k].x.push_back(theta), curves[k].y.push_back(y[k]);
+        const bool defined[] = {true, true, true, true, e.shape.defined, e.cosine.defined};
+        for (std::size_t k = 0; k < 6; ++k)
+            if (defined[k]) curves[k].x.push_back(theta), curves[k].y.push_back(y[k]);
     }
     return "<div class=\"charts\">" + page_chart("scattered energy against θ<sub>i</sub>", {curves[0], curves[1]}) +
            page_chart("energy of R against θ<sub>i</sub>", {curves[2], curves[3]}) +

@@ -63,3 +63,15 @@ TEST_CASE("Tungsten's adapter, whole width: the mean of the near field", "[integ
     }
     CHECK(double(whole.eval(event)[0]) == Approx(mean).epsilon(2e-3));
 }
+
+TEST_CASE("Tungsten's adapter refuses what it does not know", "[integrations]") {
+    Tungsten::MedullaBcsdf bsdf;
+    const Tungsten::Scene scene;
+    CHECK_NOTHROW(bsdf.fromJson({{{"preset", "bobcat"}, {"field", "far"}}}, scene));
+    CHECK_NOTHROW(bsdf.prepareForRender());
+    CHECK_THROWS_WITH(bsdf.fromJson({{{"preset", "unicorn"}}}, scene), Catch::Contains("unicorn"));
+    CHECK_THROWS_WITH(bsdf.fromJson({{{"field", "middle"}}}, scene), Catch::Contains("middle"));
+    medulla::FurParameters<3> p;
+    p.kappa = 1.2f;
+    CHECK_THROWS(bsdf.prepare(p, false));
+}

@@ -87,6 +87,27 @@ class FurRender(unittest.TestCase):
         self.assertTrue(0 < report["traversal"] < 1 and 0 < report["shading"] < 1)
         self.assertEqual(sorted(os.listdir(self.cwd)), ["patch.json", "x.png"])
 
+    def test_streams(self):
+        """Progress may be lost; a report that cannot be written is an error."""
+        words = [os.path.join(BIN, "fur-render"), "patch.json", "-o", "x.png", "--spp", "16", "--width", "64", "--height",
+                 "64", "--progress", "bar", "--threads", "2"]
+        with open("/dev/full", "w") as full:
+            done = subprocess.run(words, stdout=subprocess.PIPE, stderr=full, text=True, cwd=self.cwd)
+            self.assertEqual(done.returncode, 0)
+            self.assertIn("16 samples", done.stdout)
+            done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, cwd=self.cwd)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("standard output: cannot be written", done.stderr)
+        done = subprocess.run(["/bin/sh", "-c", '"$0" "$@" 2>&-', *words], stdout=subprocess.PIPE, cwd=self.cwd)
+        self.assertEqual(done.returncode, 0)
+        self.assertEqual(form_of_png(self.path("x.png")), (64, 64, 8, 2))
+        os.symlink("/dev/full", self.path("full.png"))
+        for size in (8, 256):  # that fail as the file is closed, and before
+            self.fails(1, "patch.json", "-o", "full.png", "--spp", 1, "--progress", "none", "--width", size, "--height",
+                       size, names=["full.png: cannot be written: "])
+        self.assertIn("No space left", run("patch.json", "-o", "full.png", "--spp", 1, "--progress", "none", "--width", 8,
+                                           "--height", 8, cwd=self.cwd)[2])
+
     def test_bytes(self):
         pictures = set()
         for threads in (1, 2):

@@ -29,6 +29,20 @@ TEST_CASE("white furnace: a fibre that absorbs nothing cannot be seen before a w
     }
 }
 
+TEST_CASE("white furnace: nor where the index alone changes along the strand", "[render][furnace]") {
+    for (const float root : {1.4f, 1.6f}) {
+        Scene scene = parse_scene(tests::patch("white", tests::white_sky, 100), "test");
+        scene.materials[1].fur = scene.materials[0].fur;
+        scene.materials[0].fur.eta = root, scene.materials[1].fur.eta = 3 - root;
+        scene.objects[0].coat[0].along = {{0, 0}, {1, 1}};
+        RenderOptions o = options(16);
+        o.path.sample_lights = false;
+        Counts counts;
+        CHECK(mean_luminance(picture(scene, o, &counts)) == Approx(1).margin(1e-3));
+        CHECK(counts.clamped == 0);
+    }
+}
+
 TEST_CASE("white furnace: nor can a coat of them on a white skin", "[render][furnace]") {
     const Scene scene = parse_scene(tests::patch("white", tests::white_sky), "test");
     RenderOptions o = options(32);

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstring>
 
+#include "render/image_file.hpp"
 #include "tests/render/scenes.hpp"
 
 using namespace medulla::render;
@@ -79,6 +80,17 @@ TEST_CASE("the same bytes for any number of threads, and after a kill", "[render
     CHECK_THROWS_WITH(picture(scene, o), Catch::Contains("damaged"));
     std::remove(path.c_str());
     CHECK(same_bytes(one, picture(scene, o)));  // no such file: from the start
+}
+
+TEST_CASE("the tone curve rises to 1 and stays there", "[render][tone]") {
+    float before = 0;
+    for (float x = 0; x < 9; x += 0.01f) {
+        CHECK(filmic(x) >= before);
+        before = filmic(x);
+    }
+    CHECK(filmic(0) == 0);
+    CHECK(filmic(1) == Approx(0.8).epsilon(0.01));  // image_file.cpp
+    for (const float x : {8.0f, 1e20f, std::numeric_limits<float>::infinity()}) CHECK(filmic(x) == 1);
 }
 
 TEST_CASE("an error that is asked for is reached, and no samples beyond it are spent", "[render][error]") {

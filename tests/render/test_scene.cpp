@@ -47,6 +47,7 @@ TEST_CASE("a bad scene is refused in one line that names file, field, expected a
         {with(coat, R"(, "extra": 1)"), {"/extra", "no such field", "camera", "lights"}},
         {with(R"({"shape": "cube"})"), {"/objects/0/shape", "patch, sphere, torus", "cube"}},
         {with(R"({"radius": -1})"), {"/objects/0/radius", "> 0", "found -1"}},
+        {with(R"({"radius": 1e-99})"), {"/objects/0/radius", "> 0", "found 1e-99"}},
         {with(R"({"radius": "one"})"), {"/objects/0/radius", "\"one\""}},
         {with(R"({"shape": "torus", "radius": 1, "tube": 2})"), {"/objects/0/tube", "(0, 1]", "found 2"}},
         {with(R"({"skin": [0, 0.5, 1.5]})"), {"/objects/0/skin/2", "[0, 1]", "found 1.5"}},
@@ -79,6 +80,18 @@ TEST_CASE("a bad scene is refused in one line that names file, field, expected a
     }
     CHECK_THROWS_WITH(read_scene("/nowhere/s.json"),
                       Catch::Contains("/nowhere/s.json") && Catch::Contains("No such file"));
+}
+
+TEST_CASE("a coat of more strands than Embree counts is refused before any grows", "[render][groom]") {
+    Shape shape;
+    Layer layer;
+    layer.density = 1e9f;
+    CHECK_THROWS_WITH(grow(shape, layer), Catch::Contains("at most 4.77e+08 strands, found 1.26e+10"));
+    shape.radius = 1e9f;
+    CHECK_THROWS_WITH(grow(shape, layer), Catch::Contains("found 1.26e+28"));
+    // Clumps smaller than any strand: as many as there are strands, each with its own.
+    shape.radius = 1, layer.density = 20, layer.clump_size = 1e-30f;
+    CHECK(grow(shape, layer).count() == 251);
 }
 
 TEST_CASE("roots keep their distance and number", "[render][groom]") {

@@ -1,7 +1,9 @@
 // A stand-in for what the adapter uses of Tungsten: names and conventions of its Bsdf, nothing else.
 #pragma once
 
+#include <map>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -48,10 +50,17 @@ struct SurfaceScatterEvent {
 
 class Scene {};
 struct JsonPtr {
+    std::map<std::string, std::string> texts;
     template <class T>
     bool getField(const char*, T&) const {
         return false;
     }
+    bool getField(const char* name, std::string& value) const {
+        const auto at = texts.find(name);
+        if (at != texts.end()) value = at->second;
+        return at != texts.end();
+    }
+    [[noreturn]] void parseError(std::string description) const { throw std::runtime_error(description); }
 };
 
 class Bsdf {

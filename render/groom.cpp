@@ -5,8 +5,8 @@
 namespace medulla::render {
 namespace {
 
-/// Points in a grid, whose cells are as wide as the greatest distance of a query. A hash table of lists in one array: most
-/// cells that a query visits are empty, and cost one read.
+/// Points in a grid, whose cells are as wide as the greatest distance of a query. A hash table of lists in one array:
+/// most cells that a query visits are empty, and cost one read.
 class PointGrid {
   public:
     /// @param expected number of points
@@ -22,8 +22,8 @@ class PointGrid {
         first_[list(k)] = std::uint32_t(entries_.size() - 1);
     }
 
-    /// Calls visit(point, number) for every point within a cell's width of p and for some farther ones, those of its own
-    /// cell first, until one returns false.
+    /// Calls visit(point, number) for every point within a cell's width of p and for some farther ones, those of its
+    /// own cell first, until one returns false.
     template <class Visit>
     void around(Vec3 p, Visit&& visit) const {
         const std::int64_t x = cell(p.x), y = cell(p.y), z = cell(p.z);

@@ -74,7 +74,7 @@ std::uint32_t mask_of(const std::vector<std::string>& names) {
 }
 
 struct Options {
-    std::string scene, field = "near", tone;
+    std::string scene, field = "near", tone, layer_pngs;
     std::vector<std::string> out;
     std::vector<std::string> lobes;
     RenderOptions render;
@@ -102,15 +102,17 @@ void run(const Options& o, const CLI::App& app) {
     if (!o.lobes.empty()) options.path.lobes = mask_of(o.lobes);
     const bool open_ended = options.seconds > 0 || options.error > 0;
     options.samples = o.samples > 0 ? std::uint32_t(o.samples) : open_ended ? 1u << 20 : 64;
+    const bool layers = o.layers || !o.layer_pngs.empty();
     options.unfinished = o.out.front() + ".unfinished";
-    options.key = fmt::format("{}\n{} {} {} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
-                              scene.picture.height, o.field, options.path.lobes, o.density, options.path.clamp,
-                              options.seed, options.path.sample_lights, o.layers, scene.text);
+    options.key =
+        fmt::format("{}\n{} {} {} {} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width, scene.picture.height,
+                    o.field, options.path.averaged_vertices, options.path.lobes, o.density, options.path.clamp,
+                    options.seed, options.path.sample_lights, layers, scene.text);
 
     const auto start = std::chrono::steady_clock::now();
     const PathTracer tracer(scene, options.path);
     const double building = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    Film film(scene.picture.width, scene.picture.height, o.layers);
+    Film film(scene.picture.width, scene.picture.height, layers);
     Report report;
     const double processor_before = processor_seconds();
     {
@@ -124,6 +126,7 @@ void run(const Options& o, const CLI::App& app) {
         else
             write_exr(film, out);
     }
+    if (!o.layer_pngs.empty()) write_layer_pngs(film, scene.picture, o.layer_pngs);
     std::remove(options.unfinished.c_str());
 
     const Counts& n = report.counts;
@@ -202,6 +205,13 @@ int main(int argc, char** argv) {
     app.add_option("--seed", o.render.seed, "another seed, other noise");
     app.add_flag("--resume", o.render.resume, "go on from OUT.unfinished, which a killed run leaves");
     app.add_flag("--layers", o.layers, "the EXR gets lobes, direct and indirect light, normals, depth and more");
+    app.add_option(
+        "--layer-pictures", o.layer_pngs,
+        "write PREFIXTTs.png and so on: one PNG for each lobe of the first vertex, direct and indirect light");
+    app.add_option("--averaged-vertices", o.render.path.averaged_vertices,
+                   "of a path that --field multiscale averages; later ones take the offset of the ray's hit")
+        ->check(CLI::Range(1, 1000000))
+        ->capture_default_str();
     app.add_flag("--no-light-sampling", o.no_light_sampling, "find lights by scattering alone (reference)");
     const std::map<std::string, ProgressMode> modes{{"auto", ProgressMode::automatic},
                                                     {"bar", ProgressMode::bar},

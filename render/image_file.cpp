@@ -30,10 +30,16 @@ float filmic(float x) {
 }
 
 void write_png(const Film& film, const Picture& picture, const std::string& path) {
+    write_png(
+        film, [&](std::size_t i) { return film.colour(i); }, picture, path);
+}
+
+void write_png(const Film& film, const std::function<Rgb(std::size_t)>& colour, const Picture& picture,
+               const std::string& path) {
     std::vector<std::uint8_t> bytes(3 * film.pixels.size());
     const float scale = std::exp2(picture.exposure);
     for (std::size_t i = 0; i < film.pixels.size(); ++i) {
-        const Rgb c = film.colour(i);
+        const Rgb c = colour(i);
         const float channel[3] = {c.x, c.y, c.z};
         // Dither of half a step either way, the same for the three channels: no banding, no coloured noise.
         const float dither = unit_float(scatter_bits(std::uint32_t(i))) - 0.5f;
@@ -92,6 +98,17 @@ std::vector<Channel> channels_of(const Film& film) {
 }
 
 }  // namespace
+
+void write_layer_pngs(const Film& film, const Picture& picture, const std::string& prefix) {
+    const float share = 1 / float(film.samples);
+    const auto write = [&](const std::string& name, const std::function<Rgb(std::size_t)>& colour) {
+        write_png(film, colour, picture, fmt::format("{}{}.png", prefix, name));
+    };
+    const std::vector<Layers>& all = film.layers;
+    for (int k = 0; k < Layers::other; ++k) write(lobe_names[k], [&](std::size_t i) { return share * all[i].lobe[k]; });
+    write("direct", [&](std::size_t i) { return share * all[i].direct; });
+    write("indirect", [&](std::size_t i) { return film.colour(i) - share * all[i].direct; });
+}
 
 void write_exr(const Film& film, const std::string& path) {
     const std::vector<Channel> channels = channels_of(film);

@@ -178,7 +178,11 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts, Layers* layers) c
                 fibre.column = unit_float(hash(layer.seed ^ 0x3c6ef372u, strand.strand));
             const Pair a = random.pair(), b = random.pair();
             const float c = options_.field == FieldChoice::one_offset ? 0 : random.number();
-            counts.clamped += shading_->at(fibre, options_.field, [&](const auto& field) {
+            const FieldChoice field_choice =
+                options_.field == FieldChoice::multiscale && vertex >= options_.averaged_vertices
+                    ? FieldChoice::one_offset
+                    : options_.field;
+            counts.clamped += shading_->at(fibre, field_choice, [&](const auto& field) {
                 if (light.pdf > 0) {
                     const Evaluation<3> e = field.evaluate(light.direction);
                     towards = {rgb(e.value), e.pdf};

@@ -29,6 +29,7 @@ struct Counts {
 
 struct PathOptions {
     FieldChoice field = FieldChoice::one_offset;
+    int averaged_vertices = 1;  ///< of a multi-scale path: later ones take the offset of the ray's own hit
     std::uint32_t lobes = 63;   ///< the lobes by which fibres scatter, a LobeMask; 63: all
     float clamp = 0;            ///< most that one vertex after the first may add [luminance]; 0: no limit, no bias
     bool sample_lights = true;  ///< next-event estimation; without it, lights are found by scattering alone

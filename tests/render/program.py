@@ -140,6 +140,17 @@ class FurRender(unittest.TestCase):
         self.assertEqual(run("patch.json", "-o", "x.exr", "--layers", "--spp", 1, *SMALL, cwd=self.cwd)[0], 0)
         self.assertIn(b"lobe_TT.R", bytes_of(self.path("x.exr")))
 
+    def test_layer_pictures(self):
+        """A PNG for each lobe and for direct and indirect light; the picture is the same bytes without them."""
+        names = ["R", "TT", "TRT", "TTs", "TRTs", "residual", "direct", "indirect"]
+        self.assertEqual(run("patch.json", "-o", "with.png", "--layer-pictures", "layer_", "--spp", 8, *SMALL, cwd=self.cwd)[0], 0)
+        self.assertEqual(run("patch.json", "-o", "without.png", "--spp", 8, *SMALL, cwd=self.cwd)[0], 0)
+        self.assertEqual(bytes_of(self.path("with.png")), bytes_of(self.path("without.png")))
+        pictures = [bytes_of(self.path("layer_%s.png" % name)) for name in names]
+        self.assertEqual(len(set(pictures)), len(names))
+        for picture in pictures:
+            self.assertEqual(picture[:8], b"\x89PNG\r\n\x1a\n")
+
     def test_scenes_that_ship(self):
         """Each is one that the program takes; the furnace's mean is 1 to 5 standard errors of the picture's mean."""
         for name in sorted(name for name in os.listdir(SCENES) if name.endswith(".json")):

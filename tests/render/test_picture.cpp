@@ -53,6 +53,8 @@ TEST_CASE("near, far and multi-scale fields of fur that is small in the pixel ag
         o.path.field = field, o.seed = 2;
         same_mean(one, picture(scene, o), 0.01);  // hits of hidden fibres are not quite even in h: docs/render.md
     }
+    o.path.averaged_vertices = 1000, o.seed = 3;  // every vertex of the path, not the first alone
+    same_mean(one, picture(scene, o), 0.01);
 }
 
 TEST_CASE("the same bytes for any number of threads, and after a kill", "[render][bytes]") {

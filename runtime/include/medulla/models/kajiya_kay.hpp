@@ -26,8 +26,8 @@ MEDULLA_FN float power_of_cosine(float x, float p) noexcept {
 /// Its integral over theta_r in (-pi/2, pi/2), x = theta_i + theta_r: beyond 6 / sqrt(p) lies less than 2e-9 of it,
 /// since cos^p x < exp(-p x^2 / 2); 24 Gauss nodes.
 MEDULLA_FN float power_of_cosine_integral(float theta_i, float p) noexcept {
-    const float edge = float(pi / 2), reach = 6 / math::sqrt(p), low = -lesser(edge - magnitude(theta_i), reach),
-                high = lesser(edge, reach), half = 0.5f * (high - low), middle = 0.5f * (high + low);
+    const float edge = float(pi / 2), within_6 = 6 / math::sqrt(p), low = -lesser(edge - magnitude(theta_i), within_6),
+                high = lesser(edge, within_6), half = 0.5f * (high - low), middle = 0.5f * (high + low);
     const GaussRule rule = gauss_rule(3);
     float sum = 0;
     for (int i = 0; i < rule.half; ++i)

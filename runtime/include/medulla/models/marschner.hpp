@@ -21,7 +21,7 @@ struct Marschner {
     float alpha_R = -0.12f;                     ///< [radians], in [-pi/4, pi/4]; TT -1/2 and TRT -3/2 of it
     float beta_R = 0.12f;                       ///< deviation along [radians], in [1e-3, 2]; TT 1/2 and TRT 2 of it
     float glint = 2.5f;                         ///< k_G [1], in [0, 100]: 0.539 keeps the energy of narrow glints
-    float glint_width = 0.26f;                  ///< w_c, deviation of a glint around [radians], in [1e-3, 2]
+    float glint_width = 0.26f;                  ///< w_c, deviation of a glint around [radians], in [1e-5, 2]
     float fade = 0.3f;                          ///< range of eta' over which glints merge [1], in [1e-3, 10]
     float glint_limit = 0.5f;                   ///< most offsets h that a glint takes in [1], in [0, 2]
     bool normalised = false;                    ///< M integrates to 1 over theta_r, and S cos^2 theta_r to the energy
@@ -33,7 +33,7 @@ struct Marschner {
         v("alpha_R", m.alpha_R, -float(pi / 4), float(pi / 4));
         v("beta_R", m.beta_R, 1e-3f, 2.0f);
         v("glint", m.glint, 0.0f, 100.0f);
-        v("glint_width", m.glint_width, 1e-3f, 2.0f);
+        v("glint_width", m.glint_width, 1e-5f, 2.0f);
         v("fade", m.fade, 1e-3f, 10.0f);
         v("glint_limit", m.glint_limit, 0.0f, 2.0f);
     }
@@ -73,7 +73,7 @@ template <class Use>
 MEDULLA_FN void visit_roots(int p, const Inclination<float>& at, const Caustic& fold, float phi, Use&& use) noexcept {
     constexpr float edge = float(pi / 2);
     const auto found = [&](float gamma) {
-        const float cosine = polynomial::cosine(gamma), x = math::sqrt(at.index_excess + cosine * cosine);
+        const float cosine = cosine_of(gamma), x = math::sqrt(at.index_excess + cosine * cosine);
         const float slope = magnitude(exit_slope(p, at, cosine, x));
         if (slope > 1e-6f * cosine) use(gamma, cosine, 0.5f * cosine / slope);  // at a fold there is no density
     };

@@ -74,7 +74,7 @@ std::uint32_t mask_of(const std::vector<std::string>& names) {
 }
 
 struct Options {
-    std::string scene, field = "near", tone;
+    std::string scene, field = "near", model = "fur", tone;
     std::vector<std::string> out;
     std::vector<std::string> lobes;
     RenderOptions render;
@@ -98,13 +98,15 @@ void run(const Options& o, const CLI::App& app) {
     options.path.field = o.field == "near"  ? FieldChoice::one_offset
                          : o.field == "far" ? FieldChoice::whole_width
                                             : FieldChoice::multiscale;
+    for (std::size_t i = 0; i < std::size(model_names); ++i)
+        if (o.model == model_names[i]) options.path.model = static_cast<FibreModel>(i);
     options.path.sample_lights = !o.no_light_sampling;
     if (!o.lobes.empty()) options.path.lobes = mask_of(o.lobes);
     const bool open_ended = options.seconds > 0 || options.error > 0;
     options.samples = o.samples > 0 ? std::uint32_t(o.samples) : open_ended ? 1u << 20 : 64;
     options.unfinished = o.out.front() + ".unfinished";
-    options.key = fmt::format("{}\n{} {} {} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
-                              scene.picture.height, o.field, options.path.lobes, o.density, options.path.clamp,
+    options.key = fmt::format("{}\n{} {} {} {} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
+                              scene.picture.height, o.field, o.model, options.path.lobes, o.density, options.path.clamp,
                               options.seed, options.path.sample_lights, o.layers, scene.text);
 
     const auto start = std::chrono::steady_clock::now();
@@ -184,6 +186,9 @@ int main(int argc, char** argv) {
                    "near: one offset; far: the fibre's whole width; multiscale: what the pixel covers")
         ->check(CLI::IsMember({"near", "far", "multiscale"}))
         ->capture_default_str();
+    app.add_option("--model", o.model, "by which fibres scatter, with the materials' parameters (docs/models.md)")
+        ->check(CLI::IsMember(std::vector<std::string>(std::begin(model_names), std::end(model_names))))
+        ->capture_default_str();
     app.add_option("--lobes", o.lobes, "by which fibres scatter, of R,TT,TRT,TTs,TRTs,residual; all")
         ->delimiter(',')
         ->check(
@@ -222,6 +227,8 @@ int main(int argc, char** argv) {
         for (const std::string& out : o.out)
             if (!ends_with(out, ".png") && !ends_with(out, ".exr"))
                 throw CLI::ValidationError("-o", "expected a name that ends in .png or .exr, found " + out);
+        if (!o.lobes.empty() && o.model != "fur" && o.model != "eq12")
+            throw CLI::ValidationError("--lobes", "expected --model fur or eq12, found " + o.model);
         if (o.layers &&
             std::none_of(o.out.begin(), o.out.end(), [](const std::string& s) { return ends_with(s, ".exr"); }))
             throw CLI::ValidationError("--layers", "expected an -o that ends in .exr");

@@ -212,7 +212,7 @@ TEST_CASE("Chiang: a reflection leaves on the side of its surface, tilted toward
     CHECK(at(0, -turn) > 20 * at(0, turn));
     // Scales rise from root to tip, so that their outer face looks to the root: R leaves at x = -sin(2 alpha).
     CHECK(at(-0.174, -turn) > 1.5 * at(0.174, -turn));
-    CHECK(Chiang<3>().deviation() == Approx(0.726 * 0.3 + 0.812 * 0.09 + 3.7 * std::pow(0.3, 20)).epsilon(1e-6));
+    CHECK(Chiang<3>::deviation_of(0.3f) == Approx(0.726 * 0.3 + 0.812 * 0.09 + 3.7 * std::pow(0.3, 20)).epsilon(1e-6));
 }
 
 TEST_CASE("cylinder: limits, and parameters that are wrong") {

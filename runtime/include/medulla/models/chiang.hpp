@@ -46,21 +46,17 @@ struct Chiang {
     float beta_n = 0.3f;  ///< and around, in [0.005, 1]
     static constexpr bool tail = true;
 
-    /// Deviation sqrt(v) of R along the fibre [radians] (Eq. 7 of the paper). v of TT is a quarter, of TRT four times
-    /// it.
-    MEDULLA_FN float deviation() const noexcept {
-        return 0.726f * beta_m + 0.812f * beta_m * beta_m + 3.7f * twentieth(beta_m);
-    }
+    /// Deviation sqrt(v) of R along the fibre [radians] (Eq. 7). v of TT is a quarter, of TRT four times it.
+    MEDULLA_FN static float deviation_of(float x) noexcept { return 0.726f * x + 0.812f * x * x + 3.7f * twentieth(x); }
     /// Scale s of the logistic [radians] (Eq. 8); its deviation is s pi / sqrt(3).
-    MEDULLA_FN float scale() const noexcept {
-        return 0.626657069f *
-               (0.265f * beta_n + 1.194f * beta_n * beta_n + 5.372f * twentieth(beta_n) * beta_n * beta_n);
+    MEDULLA_FN static float scale_of(float x) noexcept {
+        return 0.626657069f * (0.265f * x + 1.194f * x * x + 5.372f * twentieth(x) * x * x);
     }
     MEDULLA_FN detail::VonMisesFisher along(int p, float theta_i) const noexcept {
-        const float d = deviation() * (p == 0 ? 1.0f : p == 1 ? 0.5f : 2.0f);
+        const float d = deviation_of(beta_m) * (p == 0 ? 1.0f : p == 1 ? 0.5f : 2.0f);
         return detail::von_mises_fisher(d * d, theta_i, alpha * (p == 0 ? 2.0f : p == 1 ? -1.0f : p == 2 ? -4.0f : 0));
     }
-    MEDULLA_FN detail::TrimmedLogistic around(int) const noexcept { return detail::trimmed_logistic(scale()); }
+    MEDULLA_FN detail::TrimmedLogistic around(int) const noexcept { return detail::trimmed_logistic(scale_of(beta_n)); }
     template <class Visit>
     MEDULLA_FN static void visit(const Chiang& m, Visit&& v) noexcept {
         v("eta", m.eta, detail::least_above_1, 10.0f);

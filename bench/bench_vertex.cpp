@@ -17,6 +17,7 @@
 #include "medulla/models/kajiya_kay.hpp"
 #include "medulla/models/kim.hpp"
 #include "medulla/models/marschner.hpp"
+#include "medulla/models/yan2015.hpp"
 #include "medulla/models/zinke.hpp"
 #include "nvcc_figures.hpp"
 #include "tests/support/fibre_of.hpp"
@@ -252,6 +253,11 @@ int main(int argc, char** argv) {
               [](const PathHit& hit) { return near_field(hair_of<models::Zinke<3>>(hit), hit.known, hit.h); });
     model_row("Zinke, far", [](const PathHit& hit) { return far_field(hair_of<models::Zinke<3>>(hit), hit.known); });
     model_row("d'Eon", [](const PathHit& hit) { return far_field(hair_of<models::DEon<3>>(hit), hit.known); });
+    const auto bobcat = models::parameters_of<3>(models::yan2015_presets[0]);
+    const test::OwnedTables double_cylinder(default_pack(), ranges_of(bobcat));
+    model_row("Yan 2015, near", [bobcat, tables = double_cylinder.get()](const PathHit& hit) {
+        return near_field(bobcat, tables, hit.known, hit.h);
+    });
     model_row("hair (Chiang-style)",
               [](const PathHit& hit) { return near_field(hair_of<models::Chiang<3>>(hit), hit.known, hit.h); });
     times.run(seconds);

@@ -8,8 +8,9 @@ namespace medulla::render {
 
 /// Calls use(hit) of one of the other models. @param whole_width the mean over the width, where a model has a choice
 template <class Use>
-void with_model(FibreModel model, const FurParameters<3>& p, Vector known, float h, bool whole_width, Use&& use) {
+void with_model(FibreModel model, const Fibre<3>& fibre, Vector known, float h, bool whole_width, Use&& use) {
     using namespace models;
+    const FurParameters<3>& p = fibre.parameters;
     switch (model) {
         case FibreModel::kajiya_kay:
             return use(far_field(kajiya_kay_of(p, false), known));
@@ -25,6 +26,8 @@ void with_model(FibreModel model, const FurParameters<3>& p, Vector known, float
             return use(far_field(deon_of(p), known));
         case FibreModel::chiang:
             return use(near_field(chiang_of(p), known, h));
+        case FibreModel::yan2015:
+            return use(near_field(yan2015_of(p), fibre.tables, known, h));
         case FibreModel::fur:
         case FibreModel::eq12:
             break;

@@ -16,9 +16,9 @@ class Shading;  // shading.hpp: all of the runtime, which only path.cpp needs to
 enum class FieldChoice { one_offset, whole_width, multiscale };
 
 /// By which model fibres scatter.
-enum class FibreModel { fur, eq12, kajiya_kay, kajiya_kay_normalised, kim, marschner, zinke, deon, chiang };
+enum class FibreModel { fur, eq12, kajiya_kay, kajiya_kay_normalised, kim, marschner, zinke, deon, chiang, yan2015 };
 inline constexpr const char* model_names[] = {
-    "fur", "eq12", "kajiya-kay", "kajiya-kay-normalised", "kim", "marschner", "zinke", "deon", "chiang"};
+    "fur", "eq12", "kajiya-kay", "kajiya-kay-normalised", "kim", "marschner", "zinke", "deon", "chiang", "yan2015"};
 
 /// Whether a model's lobes are the runtime's: `eq12` leaves out the residual one.
 constexpr bool is_fur(FibreModel model) { return model == FibreModel::fur || model == FibreModel::eq12; }

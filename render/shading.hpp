@@ -63,7 +63,7 @@ class Shading {
     Shading(const Scene& scene, const std::vector<Strands>& layers, LobeMask lobes, FibreModel model)
         : lobes_(model == FibreModel::eq12 ? lobes & ~lobe_bit(Lobe::residual) : lobes), model_(model) {
         const PackView pack = default_pack();
-        for (const Strands& layer : layers) coats_.push_back(make_coat(scene.materials, layer, pack));
+        for (const Strands& layer : layers) coats_.push_back(make_coat(scene.materials, layer, pack, model));
     }
 
     /// Share of the light that leaves the fibre again, for a ray at the hit's offset: of fur.
@@ -83,7 +83,7 @@ class Shading {
         const float h = offset_of(known, FieldInWorld<int>::local(basis, hit.point));
         const Fibre<3> fibre = this->fibre(hit);
         if (!is_fur(model_)) {
-            with_model(model_, fibre.parameters, known, h, choice == FieldChoice::whole_width, [&](const auto& field) {
+            with_model(model_, fibre, known, h, choice == FieldChoice::whole_width, [&](const auto& field) {
                 use(FieldInWorld<std::decay_t<decltype(field)>>{basis, field});
             });
             return fibre.status == FibreStatus::clamped_parameters;
@@ -125,7 +125,8 @@ class Shading {
     }
 
     /// Tables for the ranges of all parameters that interpolation between the stops and textures can give.
-    static Coat make_coat(const std::vector<Material>& materials, const Strands& layer, const PackView& pack) {
+    static Coat make_coat(const std::vector<Material>& materials, const Strands& layer, const PackView& pack,
+                          FibreModel model) {
         const std::vector<Stop>& along = layer.along;
         Coat coat;
         coat.textures = layer.textures;
@@ -148,7 +149,8 @@ class Shading {
             if (texture->sets == Sets::sigma_ms_factor)
                 low.sigma_ms *= std::clamp(least, 0.0f, 1.0f), high.sigma_ms *= std::max(1.0f, most);
         }
-        const TableRanges ranges = join(ranges_of(low), ranges_of(high));
+        TableRanges ranges = join(ranges_of(low), ranges_of(high));
+        if (model == FibreModel::yan2015) ranges.eta = 0;  // it reads C^M at another optical radius
         const std::size_t bytes = (tables_bytes(pack, ranges) + 63) / 64 * 64;
         coat.memory.reset(std::aligned_alloc(64, std::max<std::size_t>(64, bytes)));
         const TablesResult made = make_tables(pack, ranges, coat.memory.get(), bytes);

@@ -12,6 +12,7 @@
 #include "medulla/models/kajiya_kay.hpp"
 #include "medulla/models/kim.hpp"
 #include "medulla/models/marschner.hpp"
+#include "medulla/models/yan2015.hpp"
 #include "medulla/models/zinke.hpp"
 
 namespace medulla {
@@ -112,6 +113,16 @@ MEDULLA_FN DEon<Channels> deon_of(const FurParameters<Channels>& p) noexcept {
     m.eta = p.eta, m.alpha = p.alpha;
     m.beta_m = detail::greater(p.beta_m, 1e-3f), m.beta_n = detail::greater(p.beta_n, 1e-3f);
     detail::hair_absorption(p, m.sigma_a);
+    return m;
+}
+
+/// One index and one roughness, beta_m; the medulla does not absorb.
+template <int Channels>
+MEDULLA_FN Yan2015<Channels> yan2015_of(const FurParameters<Channels>& p) noexcept {
+    Yan2015<Channels> m;
+    m.eta_c = m.eta_m = p.eta, m.kappa = p.kappa, m.layers = p.layers, m.sigma_ms = p.sigma_ms, m.g = p.g;
+    m.alpha = p.alpha, m.beta = detail::lesser(p.beta_m, 2);
+    for (int c = 0; c < Channels; ++c) m.sigma_ca[c] = p.sigma_ca[c];
     return m;
 }
 

@@ -1,4 +1,4 @@
-// A path vertex in nanoseconds, beside a plain hair BCSDF (chiang_hair.hpp) in the same process: make the fibre, take
+// A path vertex in nanoseconds, beside a hair BCSDF (models/chiang.hpp) in the same process: make the fibre, take
 // the hit's field, draw a direction with value and pdf, evaluate value and pdf for one light direction. Run:
 // bench_vertex [--json] [--seconds S] [--no-gpu]; --json prints JSON instead of the table. Where there is an nvcc,
 // ptxas says what vertex_kernel.cu needs of a GPU thread; that takes a minute or two and no GPU.
@@ -11,8 +11,14 @@
 #include <string>
 #include <vector>
 
-#include "chiang_hair.hpp"
 #include "medulla/medulla.hpp"
+#include "medulla/models/chiang.hpp"
+#include "medulla/models/deon.hpp"
+#include "medulla/models/kajiya_kay.hpp"
+#include "medulla/models/kim.hpp"
+#include "medulla/models/marschner.hpp"
+#include "medulla/models/yan2015.hpp"
+#include "medulla/models/zinke.hpp"
 #include "nvcc_figures.hpp"
 #include "tests/support/fibre_of.hpp"
 #include "tests/support/fur_reference.hpp"
@@ -30,8 +36,8 @@ struct PathHit {
     float h;
     float u[5];
     FurParameters<3> coat, textured_medulla, textured_colour, textured;
-    Offsets interval;  ///< a fifth of the fibre about h
-    float chiang_sigma_a[3];
+    Offsets interval;       ///< a fifth of the fibre about h
+    float hair_sigma_a[3];  ///< of the models without a medulla
 };
 
 /// Known directions as rays meet a fibre (in proportion to the width it shows them); h, light and numbers even.
@@ -52,7 +58,7 @@ std::vector<PathHit> random_hits() {
         hit.known = direction(true), hit.light = direction(false);
         hit.h = between(-1, 1);
         for (float& u : hit.u) u = uniform(engine);
-        for (float& s : hit.chiang_sigma_a) s = uniform(engine);
+        for (float& s : hit.hair_sigma_a) s = uniform(engine);
         const float low = std::min(0.8f, std::max(-1.0f, hit.h - 0.1f));
         hit.interval = {low, low + 0.2f};
         hit.coat = parameters_of<3>(*find_preset("bobcat"));
@@ -77,13 +83,30 @@ float vertex(const Field& field, const PathHit& hit) {
     return s.pdf + s.value[0] + s.direction.x + e.pdf + e.value[1];
 }
 
-float chiang_vertex(const PathHit& hit) {
-    const chiang::Hair hair(1.55f, hit.chiang_sigma_a, 0.3f, 0.3f, 0.0349f);
-    const chiang::Hit at(hair, {hit.known.x, hit.known.y, hit.known.z}, hit.h);
-    const float u[4] = {hit.u[0], hit.u[1], hit.u[2], hit.u[3]};
-    const chiang::Sample s = at.sample(u);
-    const chiang::Evaluation e = at.evaluate({hit.light.x, hit.light.y, hit.light.z});
-    return s.pdf + s.value.value[0] + s.direction.x + e.pdf + e.value.value[1];
+/// A hair of fixed roughness, its absorption from a texture.
+template <class Model>
+Model hair_of(const PathHit& hit) {
+    Model m;
+    m.eta = 1.55f, m.alpha = 0.0349f, m.beta_m = m.beta_n = 0.3f;
+    for (int c = 0; c < 3; ++c) m.sigma_a[c] = hit.hair_sigma_a[c];
+    return m;
+}
+models::Marschner<3> marschner_of(const PathHit& hit) {
+    models::Marschner<3> m;
+    for (int c = 0; c < 3; ++c) m.sigma_a[c] = hit.hair_sigma_a[c];
+    return m;
+}
+models::KajiyaKay<3> kajiya_kay_of(const PathHit& hit, bool normalised) {
+    models::KajiyaKay<3> m;
+    for (int c = 0; c < 3; ++c) m.diffuse[c] = 0.07f * hit.hair_sigma_a[c], m.specular[c] = 0.3f;
+    m.normalised = normalised;
+    return m;
+}
+models::Kim<3> kim_of(const PathHit& hit) {
+    models::Kim<3> m;
+    for (int c = 0; c < 3; ++c) m.rho_R[c] = 0.3f, m.rho_T[c] = 0.5f * hit.hair_sigma_a[c];
+    m.normalised = true;
+    return m;
 }
 
 /// The pass that a wavefront renderer makes of it: all fields, then all samples, then all lights.
@@ -215,7 +238,28 @@ int main(int argc, char** argv) {
     times.add_block(
         "batch of 1024", hit_count, [&](int, int) { return batch(hits, textured.get(), fields); },
         near_error(hits, &PathHit::textured, textured.get()));
-    times.add("hair (Chiang-style)", [&](int i) { return chiang_vertex(hits[std::size_t(i)]); });
+    const auto model_row = [&](const char* name, auto&& field) {
+        times.add(name, [&hits, field](int i) {
+            const PathHit& hit = hits[std::size_t(i)];
+            return vertex(field(hit), hit);
+        });
+    };
+    model_row("Kajiya-Kay", [](const PathHit& hit) { return far_field(kajiya_kay_of(hit, false), hit.known); });
+    model_row("Kajiya-Kay, normalised",
+              [](const PathHit& hit) { return far_field(kajiya_kay_of(hit, true), hit.known); });
+    model_row("Kim", [](const PathHit& hit) { return far_field(kim_of(hit), hit.known); });
+    model_row("Marschner", [](const PathHit& hit) { return far_field(marschner_of(hit), hit.known); });
+    model_row("Zinke, near",
+              [](const PathHit& hit) { return near_field(hair_of<models::Zinke<3>>(hit), hit.known, hit.h); });
+    model_row("Zinke, far", [](const PathHit& hit) { return far_field(hair_of<models::Zinke<3>>(hit), hit.known); });
+    model_row("d'Eon", [](const PathHit& hit) { return far_field(hair_of<models::DEon<3>>(hit), hit.known); });
+    const auto bobcat = models::parameters_of<3>(models::yan2015_presets[0]);
+    const test::OwnedTables double_cylinder(default_pack(), ranges_of(bobcat));
+    model_row("Yan 2015, near", [bobcat, tables = double_cylinder.get()](const PathHit& hit) {
+        return near_field(bobcat, tables, hit.known, hit.h);
+    });
+    model_row("hair (Chiang-style)",
+              [](const PathHit& hit) { return near_field(hair_of<models::Chiang<3>>(hit), hit.known, hit.h); });
     times.run(seconds);
 
     const std::vector<bench::KernelFigures> kernels = gpu ? gpu_figures() : std::vector<bench::KernelFigures>();

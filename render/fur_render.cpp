@@ -74,7 +74,7 @@ std::uint32_t mask_of(const std::vector<std::string>& names) {
 }
 
 struct Options {
-    std::string scene, field = "near", tone, layer_pngs;
+    std::string scene, field = "near", model = "fur", tone, layer_pngs;
     std::vector<std::string> out;
     std::vector<std::string> lobes;
     RenderOptions render;
@@ -98,6 +98,8 @@ void run(const Options& o, const CLI::App& app) {
     options.path.field = o.field == "near"  ? FieldChoice::one_offset
                          : o.field == "far" ? FieldChoice::whole_width
                                             : FieldChoice::multiscale;
+    for (std::size_t i = 0; i < std::size(model_names); ++i)
+        if (o.model == model_names[i]) options.path.model = static_cast<FibreModel>(i);
     options.path.sample_lights = !o.no_light_sampling;
     if (!o.lobes.empty()) options.path.lobes = mask_of(o.lobes);
     const bool open_ended = options.seconds > 0 || options.error > 0;
@@ -105,9 +107,9 @@ void run(const Options& o, const CLI::App& app) {
     const bool layers = o.layers || !o.layer_pngs.empty();
     options.unfinished = o.out.front() + ".unfinished";
     options.key =
-        fmt::format("{}\n{} {} {} {} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width, scene.picture.height,
-                    o.field, options.path.averaged_vertices, options.path.lobes, o.density, options.path.clamp,
-                    options.seed, options.path.sample_lights, layers, scene.text);
+        fmt::format("{}\n{} {} {} {} {} {} {} {} {} {} {}\n{}", MEDULLA_VERSION, scene.picture.width,
+                    scene.picture.height, o.field, o.model, options.path.averaged_vertices, options.path.lobes,
+                    o.density, options.path.clamp, options.seed, options.path.sample_lights, layers, scene.text);
 
     const auto start = std::chrono::steady_clock::now();
     const PathTracer tracer(scene, options.path);
@@ -187,6 +189,9 @@ int main(int argc, char** argv) {
                    "near: one offset; far: the fibre's whole width; multiscale: what the pixel covers")
         ->check(CLI::IsMember({"near", "far", "multiscale"}))
         ->capture_default_str();
+    app.add_option("--model", o.model, "by which fibres scatter, with the materials' parameters (docs/models.md)")
+        ->check(CLI::IsMember(std::vector<std::string>(std::begin(model_names), std::end(model_names))))
+        ->capture_default_str();
     app.add_option("--lobes", o.lobes, "by which fibres scatter, of R,TT,TRT,TTs,TRTs,residual; all")
         ->delimiter(',')
         ->check(
@@ -232,6 +237,8 @@ int main(int argc, char** argv) {
         for (const std::string& out : o.out)
             if (!ends_with(out, ".png") && !ends_with(out, ".exr"))
                 throw CLI::ValidationError("-o", "expected a name that ends in .png or .exr, found " + out);
+        if (!o.lobes.empty() && o.model != "fur" && o.model != "eq12")
+            throw CLI::ValidationError("--lobes", "expected --model fur or eq12, found " + o.model);
         if (o.layers &&
             std::none_of(o.out.begin(), o.out.end(), [](const std::string& s) { return ends_with(s, ".exr"); }))
             throw CLI::ValidationError("--layers", "expected an -o that ends in .exr");

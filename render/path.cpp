@@ -73,6 +73,11 @@ Shares shares_of(const FieldInWorld<Field>& field, Vec3 direction) {
     return shares;
 }
 
+/// Whether a sample of a fibre begins with an offset.
+bool draws_offset(const PathOptions& options) {
+    return options.field != FieldChoice::one_offset || options.model == FibreModel::deon;
+}
+
 float tent(float u) { return u < 0.5f ? std::sqrt(2 * u) - 1 : 1 - std::sqrt(2 - 2 * u); }
 
 }  // namespace
@@ -82,7 +87,7 @@ PathTracer::PathTracer(const Scene& scene, const PathOptions& options)
       options_(options),
       geometry_(scene),
       lights_(scene.lights),
-      shading_(new Shading(scene, geometry_.layers(), options.lobes)) {
+      shading_(new Shading(scene, geometry_.layers(), options.lobes, options.model)) {
     const Camera& c = scene.camera;
     const float half = std::tan(0.5f * c.fov);
     forward_ = normalise(c.to - c.from);
@@ -177,7 +182,7 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts, Layers* layers) c
                 fibre.root = layer.root(strand.strand),
                 fibre.column = unit_float(hash(layer.seed ^ 0x3c6ef372u, strand.strand));
             const Pair a = random.pair(), b = random.pair();
-            const float c = options_.field == FieldChoice::one_offset ? 0 : random.number();
+            const float c = draws_offset(options_) ? random.number() : 0;
             const FieldChoice field_choice =
                 options_.field == FieldChoice::multiscale && vertex >= options_.averaged_vertices
                     ? FieldChoice::one_offset
@@ -196,7 +201,8 @@ Rgb PathTracer::trace(Ray ray, Random& random, Counts& counts, Layers* layers) c
             if (layers != nullptr && vertex == 0) {
                 const Vec3 out = fibre.point - dot(fibre.point, strand.tangent) * strand.tangent;
                 layers->normal = normalise(out), layers->tangent = strand.tangent;
-                layers->albedo = shading_->albedo(fibre);
+                // Of the other models the weight of a sample, whose mean it is.
+                layers->albedo = is_fur(options_.model) ? shading_->albedo(fibre) : next.weight;
             }
             spread = std::max(spread, spread_of_fibre);
         } else {

@@ -15,6 +15,14 @@ class Shading;  // shading.hpp: all of the runtime, which only path.cpp needs to
 /// Which part of a fibre's width a vertex averages over.
 enum class FieldChoice { one_offset, whole_width, multiscale };
 
+/// By which model fibres scatter.
+enum class FibreModel { fur, eq12, kajiya_kay, kajiya_kay_normalised, kim, marschner, zinke, deon, chiang, yan2015 };
+inline constexpr const char* model_names[] = {
+    "fur", "eq12", "kajiya-kay", "kajiya-kay-normalised", "kim", "marschner", "zinke", "deon", "chiang", "yan2015"};
+
+/// Whether a model's lobes are the runtime's: `eq12` leaves out the residual one.
+constexpr bool is_fur(FibreModel model) { return model == FibreModel::fur || model == FibreModel::eq12; }
+
 struct Counts {
     std::uint64_t rays = 0, vertices = 0, nonfinite = 0;
     std::uint64_t clamped = 0;  ///< vertices whose fibre had parameters out of range, or NaN
@@ -30,6 +38,7 @@ struct Counts {
 struct PathOptions {
     FieldChoice field = FieldChoice::one_offset;
     int averaged_vertices = 1;  ///< of a multi-scale path: later ones take the offset of the ray's own hit
+    FibreModel model = FibreModel::fur;
     std::uint32_t lobes = 63;   ///< the lobes by which fibres scatter, a LobeMask; 63: all
     float clamp = 0;            ///< most that one vertex after the first may add [luminance]; 0: no limit, no bias
     bool sample_lights = true;  ///< next-event estimation; without it, lights are found by scattering alone

@@ -5,11 +5,13 @@
 #include <cmath>
 #include <cstdlib>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "medulla/medulla.hpp"
 #include "render/error.hpp"
 #include "render/groom.hpp"
+#include "render/models.hpp"
 #include "render/path.hpp"
 #include "render/scene.hpp"
 #include "render/texture.hpp"
@@ -37,10 +39,15 @@ struct FieldInWorld {
 
     Evaluation<3> evaluate(Vec3 drawn) const { return field.evaluate(local(basis, drawn)); }
     Sample<3> sample(RandomNumbers u) const { return field.sample(u); }
-    /// The value of one lobe alone.
+    /// Whether the lobes are those of Lobe, one by one.
+    static constexpr bool has_lobes = std::is_same_v<Field, NearField<3>> || std::is_same_v<Field, FarField<3>>;
+    /// The value of one lobe alone; black where it has none.
     Vec3 lobe(Lobe k, Vec3 drawn) const {
-        const Colour<3> c = field.keep(lobe_bit(k)).value(local(basis, drawn));
-        return {c[0], c[1], c[2]};
+        if constexpr (has_lobes) {
+            const Colour<3> c = field.keep(lobe_bit(k)).value(local(basis, drawn));
+            return {c[0], c[1], c[2]};
+        }
+        return {};
     }
     Vec3 world(Vector w) const { return basis.to_world({w.x, w.y, w.z}); }
     static Vector local(const Basis& basis, Vec3 w) {
@@ -53,12 +60,13 @@ inline Rgb rgb(const Colour<3>& c) { return {c[0], c[1], c[2]}; }
 
 class Shading {
   public:
-    Shading(const Scene& scene, const std::vector<Strands>& layers, LobeMask lobes) : lobes_(lobes) {
+    Shading(const Scene& scene, const std::vector<Strands>& layers, LobeMask lobes, FibreModel model)
+        : lobes_(model == FibreModel::eq12 ? lobes & ~lobe_bit(Lobe::residual) : lobes), model_(model) {
         const PackView pack = default_pack();
-        for (const Strands& layer : layers) coats_.push_back(make_coat(scene.materials, layer, pack));
+        for (const Strands& layer : layers) coats_.push_back(make_coat(scene.materials, layer, pack, model));
     }
 
-    /// Share of the light that leaves the fibre again, for a ray at the hit's offset.
+    /// Share of the light that leaves the fibre again, for a ray at the hit's offset: of fur.
     Rgb albedo(const FibreHit& hit) const {
         const Basis basis = basis_about(hit.tangent);
         const Vector known = FieldInWorld<int>::local(basis, hit.known);
@@ -74,6 +82,12 @@ class Shading {
         const Vector known = FieldInWorld<int>::local(basis, hit.known);
         const float h = offset_of(known, FieldInWorld<int>::local(basis, hit.point));
         const Fibre<3> fibre = this->fibre(hit);
+        if (!is_fur(model_)) {
+            with_model(model_, fibre, known, h, choice == FieldChoice::whole_width, [&](const auto& field) {
+                use(FieldInWorld<std::decay_t<decltype(field)>>{basis, field});
+            });
+            return fibre.status == FibreStatus::clamped_parameters;
+        }
         const bool one_offset = choice == FieldChoice::one_offset ||
                                 (choice == FieldChoice::multiscale && hit.footprint < narrow_footprint);
         if (one_offset) {
@@ -111,7 +125,8 @@ class Shading {
     }
 
     /// Tables for the ranges of all parameters that interpolation between the stops and textures can give.
-    static Coat make_coat(const std::vector<Material>& materials, const Strands& layer, const PackView& pack) {
+    static Coat make_coat(const std::vector<Material>& materials, const Strands& layer, const PackView& pack,
+                          FibreModel model) {
         const std::vector<Stop>& along = layer.along;
         Coat coat;
         coat.textures = layer.textures;
@@ -134,7 +149,8 @@ class Shading {
             if (texture->sets == Sets::sigma_ms_factor)
                 low.sigma_ms *= std::clamp(least, 0.0f, 1.0f), high.sigma_ms *= std::max(1.0f, most);
         }
-        const TableRanges ranges = join(ranges_of(low), ranges_of(high));
+        TableRanges ranges = join(ranges_of(low), ranges_of(high));
+        if (model == FibreModel::yan2015) ranges.eta = 0;  // it reads C^M at another optical radius
         const std::size_t bytes = (tables_bytes(pack, ranges) + 63) / 64 * 64;
         coat.memory.reset(std::aligned_alloc(64, std::max<std::size_t>(64, bytes)));
         const TablesResult made = make_tables(pack, ranges, coat.memory.get(), bytes);
@@ -190,6 +206,7 @@ class Shading {
     }
 
     LobeMask lobes_;
+    FibreModel model_;
     std::vector<Coat> coats_;
 };
 

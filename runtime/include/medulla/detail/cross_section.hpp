@@ -48,28 +48,46 @@ struct Path {
     Cuticle<T> cuticle;
 };
 
-/// F_1 = mean over polarisations of R + (1-R)^2 R / (1-R^2) = 2R / (1+R), F = l F_1 / (1 + (l-1) F_1) (Eq. 13).
-/// Differences are expanded so that n -> 1 and cos_i -> 0 lose no digits (docs/bcsdf.md, 'Fresnel').
-/// T is S, or several S side by side; At is either.
-/// @param index_excess n^2 - 1  @param cos_i cosine of incidence
-/// @param x sqrt(index_excess + cos_i^2) = n times the cosine of refraction
-template <class T, class S, class At>
-MEDULLA_FN Cuticle<T> cuticle(S layers, At index_excess, T cos_i, T x) noexcept {
-    // Fewer layers than 1e-30 would be seen at h = 1 alone, where T1 is 0, and there 1 / (layers F1) may overflow.
-    if (!(layers > S(1e-30))) return {T(S(0)), T(S(1))};
-    const T one = T(S(1)), m = T(index_excess), index2 = T(At(S(1)) + index_excess);
+/// Reflectance R and transmittance 1 - R of one interface, by polarisation. Differences are expanded so that n -> 1 and
+/// cos_i -> 0 lose no digits (docs/bcsdf.md, 'Fresnel').
+template <class T>
+struct Interface {
+    T Rs, Rp, Ts, Tp;
+};
+/// @param m n^2 - 1  @param index2 n^2  @param cos_i cosine of incidence
+/// @param x sqrt(n^2 - 1 + cos_i^2) = n times the cosine of refraction
+template <class S, class T>
+MEDULLA_HOT Interface<T> interface_of(T m, T index2, T cos_i, T x) noexcept {
+    const T one = T(S(1));
     const T s = cos_i + x, p = index2 * cos_i + x, inverse = one / (s * p), inverse_s = p * inverse,
             inverse_p = s * inverse;
     const T rs = m * inverse_s * inverse_s;
     const T rp = m * inverse_p * ((cos_i * cos_i * (index2 + one) - one) * inverse_p);
-    const T Rs = rs * rs, Rp = rp * rp;
-    const T Ts = T(S(2)) * cos_i * inverse_s * (one + rs);                  // 1 - Rs
-    const T Tp = T(S(4)) * (index2 * cos_i * inverse_p) * (x * inverse_p);  // 1 - Rp
+    return {rs * rs, rp * rp, T(S(2)) * cos_i * inverse_s * (one + rs),
+            T(S(4)) * (index2 * cos_i * inverse_p) * (x * inverse_p)};
+}
+
+/// F_1 = mean over polarisations of R + (1-R)^2 R / (1-R^2) = 2R / (1+R), F = l F_1 / (1 + (l-1) F_1) (Eq. 13).
+/// T is S, or several S side by side; At is either.
+/// @param index_excess n^2 - 1  @param cos_i, x as interface_of has them
+template <class T, class S, class At>
+MEDULLA_FN Cuticle<T> cuticle(S layers, At index_excess, T cos_i, T x) noexcept {
+    // Fewer layers than 1e-30 would be seen at h = 1 alone, where T1 is 0, and there 1 / (layers F1) may overflow.
+    if (!(layers > S(1e-30))) return {T(S(0)), T(S(1))};
+    const T one = T(S(1));
+    const auto [Rs, Rp, Ts, Tp] = interface_of<S>(T(index_excess), T(At(S(1)) + index_excess), cos_i, x);
     // F1 and T1 = 1 - F1 over their common denominator (1 + Rs)(1 + Rp), which F does not see.
     const T F1 = T(layers) * (Rs * (one + Rp) + Rp * (one + Rs));
     const T T1 = T(S(0.5)) * (Ts * (one + Rp) + Tp * (one + Rs));
     const T whole = one / (T1 + F1);
     return {F1 * whole, T1 * whole};
+}
+
+/// One interface without layers, unpolarised: hair's.
+template <class T>
+MEDULLA_FN Cuticle<T> bare_interface(float index_excess, T cos_i, T x) noexcept {
+    const auto [Rs, Rp, Ts, Tp] = interface_of<float>(T(index_excess), T(1.0f + index_excess), cos_i, x);
+    return {T(0.5f) * (Rs + Rp), T(0.5f) * (Ts + Tp)};
 }
 
 /// The path, from the angles of incidence and refraction. @param x sqrt(eta'^2 - 1 + cos^2 gamma_i) = eta' cos gamma_t

@@ -42,5 +42,6 @@
 #define emit
 #define foreach for
 #include "medulla/medulla.hpp"
+#include "medulla/models/from_fur.hpp"
 
 int main() { return medulla::default_pack().tables[0] ? 0 : 1; }

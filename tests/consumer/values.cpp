@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "medulla/medulla.hpp"
+#include "medulla/models/from_fur.hpp"
 
 using namespace medulla;
 
@@ -18,6 +19,24 @@ static void print(const Evaluation<Channels>& e) {
 template <int Channels>
 static void print(const Sample<Channels>& s) {
     for (const float x : {s.direction.x, s.direction.y, s.direction.z, s.pdf, s.weight[0]}) print(x);
+}
+
+/// The models that are not in medulla.hpp.
+template <class Field>
+static void print_model(const Field& hit) {
+    for (const float phi : {0.6f, -2.9f}) print(hit.evaluate(Angles{-0.2f, phi}));
+    for (const float lobe : {0.01f, 0.4f, 0.8f}) print(hit.sample({lobe, 0.3f, 0.7f, 0.2f, 0.4f}));
+}
+static void print_models(const FurParameters<2>& p, const DenseTables* tables) {
+    using namespace models;
+    const Angles known = {0.3f, 0.1f};
+    print_model(far_field(kajiya_kay_of(p, false), known));
+    print_model(far_field(kim_of(p), known));
+    print_model(far_field(marschner_of(p), known));
+    print_model(near_field(zinke_of(p), known, 0.4f));
+    print_model(far_field(deon_of(p), known));
+    print_model(near_field(chiang_of(p), known, 0.4f));
+    print_model(near_field(yan2015_of(p), tables, known, 0.4f));
 }
 
 int main() {
@@ -56,5 +75,12 @@ int main() {
             print(hit.keep(lobe_bit(Lobe::TTs)).value(direction_of(Angles{0.1f, 2.0f}))[0]);
         }
     }
+    FurParameters<2> parameters = parameters_of<2>(*find_preset("deer"));
+    parameters.beta_m = parameters.beta_n = 0.2f;  // fast math moves narrower lobes by more than is compared
+    TableRanges ranges = ranges_of(parameters);
+    ranges.eta = 0;
+    const TablesResult made = make_tables(pack, ranges, memory, sizeof memory);
+    if (made.status != TablesStatus::ok) return 1;
+    print_models(parameters, made.tables);
     return 0;
 }

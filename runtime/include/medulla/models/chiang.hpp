@@ -14,18 +14,19 @@ namespace detail {
 
 /// The logistic density of scale s, cut at +-pi.
 struct TrimmedLogistic {
-    float scale;   ///< [radians], > 0
-    float inside;  ///< mass of the whole one within +-pi
-    float below;   ///< and below -pi
+    float scale, inverse;  ///< s [radians], > 0; 1 / s
+    float inside;          ///< mass of the whole one within +-pi
+    float below;           ///< and below -pi
+    float peak;            ///< 1 / (s inside)
 
     MEDULLA_FN float pdf(float delta) const noexcept {
-        const float e = exponential(-magnitude(wrap_angle(delta)) / scale);
-        return e / (scale * (1 + e) * (1 + e) * inside);
+        const float e = exponential(-magnitude(wrap_angle(delta)) * inverse);
+        return peak * e / ((1 + e) * (1 + e));
     }
 };
 MEDULLA_FN TrimmedLogistic trimmed_logistic(float scale) noexcept {
-    const float e = exponential(-float(pi) / scale), below = e / (1 + e);
-    return {scale, 1 - 2 * below, below};
+    const float inverse = 1 / scale, e = exponential(-float(pi) * inverse), below = e / (1 + e), inside = 1 - 2 * below;
+    return {scale, inverse, inside, below, inverse / inside};
 }
 /// An angle from the centre, in [-pi, pi]. @param u in [0, 1]
 MEDULLA_FN float sample(const TrimmedLogistic& d, float u) noexcept {
@@ -78,7 +79,7 @@ using ChiangNear = CylinderHit<Channels, 4, detail::VonMisesFisher, detail::Trim
 
 template <int Channels>
 MEDULLA_FN ChiangNear<Channels> near_field(const Chiang<Channels>& m, Known known, float h) noexcept {
-    return {m, known, h};
+    return detail::run_fused([&] { return ChiangNear<Channels>(m, known, h); });
 }
 
 }  // namespace models

@@ -129,8 +129,9 @@ struct CylinderHit : Hit<CylinderHit<Channels, Lobes, Along, Around>, Channels> 
         order_energies<Channels, Lobes>(c, ray, tail, A);
         lobe_shares<Channels, Lobes>(A, share);
         for (int p = 0; p < Lobes; ++p) {
-            centre[p] = centre_of(p, ray);
-            M[p] = m.along(p, this->known_theta), D[p] = m.around(p);
+            M[p] = m.along(p, this->known_theta);
+            if (tail && p == Lobes - 1) continue;
+            centre[p] = centre_of(p, ray), D[p] = m.around(p);
         }
     }
 

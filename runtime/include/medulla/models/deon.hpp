@@ -47,7 +47,7 @@ using DEonFar = CylinderMean<Channels, Lobes, detail::VonMisesFisher>;
 
 template <int Channels, int Lobes>
 MEDULLA_FN DEonFar<Channels, Lobes> far_field(const DEon<Channels, Lobes>& m, Known known) noexcept {
-    return {m, known};
+    return detail::run_fused([&] { return DEonFar<Channels, Lobes>(m, known); });
 }
 
 }  // namespace models

@@ -56,17 +56,14 @@ struct Hit {
     MEDULLA_FN Colour<Channels> value(Angles drawn) const noexcept { return evaluate(drawn).value; }
     MEDULLA_FN float pdf(Vector drawn) const noexcept { return evaluate(drawn).pdf; }
     MEDULLA_FN float pdf(Angles drawn) const noexcept { return evaluate(drawn).pdf; }
-    MEDULLA_FN Evaluation<Channels> evaluate(Vector drawn) const noexcept { return towards(detail::polar_of(drawn)); }
-    MEDULLA_FN Evaluation<Channels> evaluate(Angles drawn) const noexcept { return towards(detail::polar_of(drawn)); }
+    MEDULLA_FN Evaluation<Channels> evaluate(Vector drawn) const noexcept {
+        return detail::run_fused([&] { return towards(detail::polar_of(drawn)); });
+    }
+    MEDULLA_FN Evaluation<Channels> evaluate(Angles drawn) const noexcept {
+        return detail::run_fused([&] { return towards(detail::polar_of(drawn)); });
+    }
     MEDULLA_FN Sample<Channels> sample(RandomNumbers u) const noexcept {
-        Sample<Channels> s;
-        if (!(known.cosine > 0)) return s;
-        const Exit exit = derived().draw(u);
-        if (exit.lobe < 0) return s;
-        const float phi = detail::wrap_angle(exit.phi);
-        const Evaluation<Channels> e = derived().at(exit.theta, detail::cosine_of(exit.theta), phi);
-        detail::set_sample(known, static_cast<Lobe>(exit.lobe), exit.theta, phi, e, s);
-        return s;
+        return detail::run_fused([&] { return draw_and_evaluate(u); });
     }
 
   protected:
@@ -81,6 +78,16 @@ struct Hit {
     }
 
   private:
+    MEDULLA_HOT Sample<Channels> draw_and_evaluate(RandomNumbers u) const noexcept {
+        Sample<Channels> s;
+        if (!(known.cosine > 0)) return s;
+        const Exit exit = derived().draw(u);
+        if (exit.lobe < 0) return s;
+        const float phi = detail::wrap_angle(exit.phi);
+        const Evaluation<Channels> e = derived().at(exit.theta, detail::cosine_of(exit.theta), phi);
+        detail::set_sample(known, static_cast<Lobe>(exit.lobe), exit.theta, phi, e, s);
+        return s;
+    }
     MEDULLA_FN const Derived& derived() const noexcept { return static_cast<const Derived&>(*this); }
     MEDULLA_FN Evaluation<Channels> towards(const detail::Polar& drawn) const noexcept {
         if (!(known.cosine > 0 && drawn.cosine > 0)) return {};

@@ -104,7 +104,7 @@ struct KajiyaKayHit : Hit<KajiyaKayHit<Channels>, Channels> {
 /// A hit. `value` is not reciprocal: as printed, `drawn` is the light.
 template <int Channels>
 MEDULLA_FN KajiyaKayHit<Channels> far_field(const KajiyaKay<Channels>& m, Known known) noexcept {
-    return {m, known};
+    return detail::run_fused([&] { return KajiyaKayHit<Channels>(m, known); });
 }
 
 }  // namespace models

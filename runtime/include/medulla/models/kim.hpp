@@ -70,7 +70,7 @@ struct KimHit : Hit<KimHit<Channels>, Channels> {
 
 template <int Channels>
 MEDULLA_FN KimHit<Channels> far_field(const Kim<Channels>& m, Known known) noexcept {
-    return {m, known};
+    return detail::run_fused([&] { return KimHit<Channels>(m, known); });
 }
 
 }  // namespace models

@@ -254,7 +254,7 @@ struct MarschnerHit : Hit<MarschnerHit<Channels>, Channels> {
 
 template <int Channels>
 MEDULLA_FN MarschnerHit<Channels> far_field(const Marschner<Channels>& m, Known known) noexcept {
-    return {m, known};
+    return detail::run_fused([&] { return MarschnerHit<Channels>(m, known); });
 }
 
 /// The reference implementation of N_p without glints: the mean over phi in [low, high] of (1/2) integral over h of A_p

@@ -323,7 +323,7 @@ struct Yan2015Hit : Hit<Yan2015Hit<Channels>, Channels> {
 template <int Channels>
 MEDULLA_FN Yan2015Hit<Channels> near_field(const Yan2015<Channels>& m, const DenseTables* tables, Known known,
                                            float h) noexcept {
-    return {m, tables, known, h};
+    return detail::run_fused([&] { return Yan2015Hit<Channels>(m, tables, known, h); });
 }
 
 }  // namespace models

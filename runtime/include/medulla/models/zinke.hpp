@@ -64,11 +64,11 @@ MEDULLA_FN ExitPoint exit_point(float eta, float theta_i, float h, int p) noexce
 
 template <int Channels>
 MEDULLA_FN ZinkeNear<Channels> near_field(const Zinke<Channels>& m, Known known, float h) noexcept {
-    return {m, known, h};
+    return detail::run_fused([&] { return ZinkeNear<Channels>(m, known, h); });
 }
 template <int Channels>
 MEDULLA_FN ZinkeFar<Channels> far_field(const Zinke<Channels>& m, Known known) noexcept {
-    return {m, known};
+    return detail::run_fused([&] { return ZinkeFar<Channels>(m, known); });
 }
 
 }  // namespace models

@@ -32,7 +32,7 @@ double relative_distance(const DirectionalDensity& a, const DirectionalDensity& 
 nlohmann::json compare_sigma(const FurPreset& preset, std::uint64_t paths, std::uint64_t seed) {
     ErrorMapOptions options;
     options.paths = paths, options.seed = seed;
-    const ErrorMap map = error_map(fibre_of(parameters_of<3>(preset), 1), Reflectance::bravais, options);
+    const ErrorMap map = error_map(fibre_of(parameters_of<3>(preset), 1), {}, options);
     const Causes& causes = map.causes[0];
     nlohmann::json row = {{"animal", preset.name}};
     std::printf("%-9s |", preset.name);
@@ -114,7 +114,7 @@ int main(int argc, char** argv) {
         const FibreProfile truth = trace_fibre(fibre, light, options);
         const OffsetRange range = h ? OffsetRange{*h, *h} : OffsetRange{0, 1};
         const FiveLobes model =
-            five_lobes(fibre, Reflectance::bravais, light.theta_i, {range}, options.theta_bins, options.phi_bins)[0];
+            five_lobes(fibre, {}, light.theta_i, {range}, options.theta_bins, options.phi_bins)[0];
         const double model_energy = model.energy[0][3] + model.energy[0][4];
         const auto shape = [&](Longitudinal which) {
             const DirectionalDensity& d = model.scattered[0][std::size_t(which)];

@@ -40,7 +40,7 @@ FurParameters<3> preset(const std::string& name, bool printed, const std::string
         return printed ? parameters_of<3>(*row) : coloured_parameters_of(*row);
     std::string names;
     for (const FurPreset& row : fur_presets) names += std::string(names.empty() ? "" : ", ") + row.name;
-    throw Error("{}: expected one of {}; found '{}'", place, names, name);
+    throw Error("{}: expected one of {}, each also with _corrected; found '{}'", place, names, name);
 }
 
 /// Fields and ranges are those of a material of medulla-precompute's scenes (docs/formats.md).
@@ -63,6 +63,8 @@ Material read_material(Fields f) {
     const Rgb c = f.colour("sigma_ca", {p.sigma_ca[0], p.sigma_ca[1], p.sigma_ca[2]});
     p.sigma_ca[0] = c.x, p.sigma_ca[1] = c.y, p.sigma_ca[2] = c.z;
     p.g = f.number("g", p.g, {-0.999, 0.999});
+    p.fresnel = static_cast<Fresnel>(f.choice("fresnel", {"bravais", "exact"}, int(p.fresnel)));
+    p.scattering = static_cast<Scattering>(f.choice("scattering", {"published", "corrected"}, int(p.scattering)));
     f.done();
     return m;
 }

@@ -487,10 +487,12 @@ class Programs(unittest.TestCase):
 
     def test_bcsdf_and_presets(self):
         presets = json.loads(run("furtable", "presets", "--json")[1])["presets"]
-        self.assertEqual(len(presets), 10)
+        self.assertEqual(len(presets), 20)
         self.assertEqual(presets[0], {"name": "bobcat", "kappa": 0.88, "eta": 1.69, "alpha": 5.48, "beta_m": 11.64,
                                       "beta_n": 7.49, "sigma_ca": 0.64, "sigma_ms": 1.69, "sigma_ma": 0.17, "g": 0.44,
-                                      "layers": 0.47})
+                                      "layers": 0.47, "fresnel": "bravais", "scattering": "published"})
+        self.assertEqual([(p["name"], p["fresnel"], p["scattering"]) for p in presets[10:]],
+                         [(p["name"] + "_corrected", "exact", "corrected") for p in presets[:10]])
         text = run("furtable", "presets")[1].splitlines()
         self.assertEqual([line.split()[0] for line in text[2:]], [p["name"] for p in presets])
         where = ["--theta-i", 20, "--theta-r", -15, "--phi", 170]
@@ -500,7 +502,7 @@ class Programs(unittest.TestCase):
             self.assertEqual((status, err), (0, ""))
             answer = json.loads(out)
             published = ["R", "TT", "TRT", "TTs", "TRTs"]
-            self.assertEqual(list(answer["lobes"]), published if "published" in args else [*published, "residual"])
+            self.assertEqual(list(answer["lobes"]), published if "--form" in args else [*published, "residual"])
             return answer
 
         cat = lobes("--preset", "cat", *where, "--h", 0.3)
@@ -524,6 +526,22 @@ class Programs(unittest.TestCase):
         self.assertEqual(len(colour["sum"]), 3)
         self.assertGreater(colour["sum"][0], colour["sum"][1])
         self.assertNotEqual(colour["lobes"]["TT"]["N"][0], cat["lobes"]["TT"]["N"])
+        # The corrected form, by a material's field, by an option, and by a preset that was fitted with it.
+        with open(material, "w") as f:
+            json.dump({"preset": "cat", "scattering": "corrected"}, f)
+        corrected = lobes("--material", material, *where, "--h", 0.3)
+        self.assertEqual(corrected, lobes("--preset", "cat", *where, "--h", 0.3, "--scattering", "corrected"))
+        self.assertEqual(corrected["lobes"]["TT"], cat["lobes"]["TT"])
+        self.assertLess(corrected["lobes"]["TTs"]["N"], 0.95 * cat["lobes"]["TTs"]["N"])
+        self.assertEqual(cat, lobes("--material", material, *where, "--h", 0.3, "--scattering", "published"))
+        with open(material, "w") as f:
+            json.dump(presets[11], f)
+        same = lobes("--material", material, *where, "--h", 0.3)
+        fitted = lobes("--preset", "cat_corrected", *where, "--h", 0.3)
+        for name, lobe in same["lobes"].items():
+            self.assertAlmostEqual(lobe["value"], fitted["lobes"][name]["value"], delta=1e-5 * (1 + lobe["value"]))
+        self.fails(2, "furtable", "bcsdf", "--preset", "cat", *where, "--far", "--scattering", "x",
+                   names=["--scattering", "published", "corrected"])
         rows = run("furtable", "bcsdf", "--preset", "cat", *where, "--h", 0.3)[1].splitlines()
         self.assertEqual([row.split()[0] for row in rows], ["lobe", "R", "TT", "TRT", "TTs", "TRTs", "residual", "sum"])
         published = lobes("--preset", "cat", *where, "--h", 0.3, "--form", "published")
@@ -544,7 +562,8 @@ class Programs(unittest.TestCase):
         self.assertEqual(lobes("--preset", "cat", *turned, "--far"), lobes("--preset", "cat", *where, "--far"))
         self.fails(1, "furtable", "bcsdf", "--material", "none.json", *where, "--far", names=["none.json"])
         self.fails(1, "furtable", "bcsdf", "--preset", "cat", *where, "--far", "--pack", "none", names=["none"])
-        for field, value in (("eta", 0.5), ("fresnel", "none"), ("sigma_ca", [1, 2]), ("colour", 1), ("kappa", "big")):
+        for field, value in (("eta", 0.5), ("fresnel", "none"), ("scattering", "mended"),
+                             ("sigma_ca", [1, 2]), ("colour", 1), ("kappa", "big")):
             with open(material, "w") as f:
                 json.dump({"preset": "cat", field: value}, f)
             self.fails(1, "furtable", "bcsdf", "--material", material, *where, "--far", names=["m.json: /" + field])

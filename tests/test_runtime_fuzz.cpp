@@ -77,7 +77,8 @@ TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
         std::getenv("MEDULLA_FUZZ");  // fibres; each is evaluated and sampled some hundred times, near and far
     const long fibres = wanted ? std::atol(wanted) : 2500;
     Inputs in(7);
-    const test::OwnedTables wide(pack.view, {-0.95f, 0.95f, 0, 16, 0});
+    const test::OwnedTables wide(pack.view, {-0.95f, 0.95f, 0, 16, 0}),
+        corrected(pack.view, {-0.95f, 0.95f, 0, 16, 0, 0, form_bit(Scattering::corrected)});
     long usable_fibres = 0, evaluated = 0, bright = 0, bad = 0, made = 0, drawn = 0;
     for (long i = 0; i < fibres; ++i) {
         FurParameters<3> p;
@@ -86,12 +87,15 @@ TEST_CASE("fuzz: finite and non-negative for any input", "[bcsdf]") {
         p.sigma_ms = in.mostly(0, 10), p.sigma_ma = in.mostly(0, 3), p.g = in.mostly(-0.95f, 0.95f);
         for (float& s : p.sigma_ca) s = in.mostly(0, 5);
         p.fresnel = in.uniform() < 0.5f ? Fresnel::bravais : Fresnel::exact;
+        p.scattering = i % 5 == 0 ? Scattering::corrected : Scattering::published;
         // Tables of any ranges, which may be refused; those of everything; none.
-        const test::OwnedTables own(
-            pack.view, i % 8 == 1 ? TableRanges{in.any(-1, 0), in.any(0, 1), in.any(0, 4), in.any(4, 16), in.any(0, 1)}
-                                  : TableRanges{0, 0, 1, 1, 0});
+        const test::OwnedTables own(pack.view, i % 8 == 1
+                                                   ? TableRanges{in.any(-1, 0), in.any(0, 1), in.any(0, 4),
+                                                                 in.any(4, 16), in.any(0, 1), 0, std::uint32_t(i % 4)}
+                                                   : TableRanges{0, 0, 1, 1, 0});
         made += i % 8 == 1 && own.get() != nullptr;
-        const DenseTables* tables = i % 8 == 1 ? own.get() : (i % 8 == 2 ? nullptr : wide.get());
+        const DenseTables* tables =
+            i % 8 == 1 ? own.get() : (i % 8 == 2 ? nullptr : (i % 5 == 0 ? corrected : wide).get());
         const Fibre<3> fibre = make_fibre(p, tables, i % 3 == 0 ? OutOfRange::clamp : OutOfRange::black);
         usable_fibres += fibre.status != FibreStatus::bad_parameters;
         const auto check = [&](float x, const char* what) {

@@ -32,6 +32,7 @@ struct Random {
 FurParameters<3> random_fur(Random& r, int i) {
     FurParameters<3> p = parameters_of<3>(fur_presets[i % fur_preset_count]);
     p.g = std::min(p.g, 0.6f);
+    p.scattering = i % 3 == 1 ? Scattering::corrected : Scattering::published;
     if (i % 2 == 0) return p;
     p.eta = 1.01f + 1.49f * r.uniform(), p.kappa = r.uniform(), p.layers = 5 * r.uniform();
     p.beta_n = 0.05f * std::pow(20.0f, r.uniform()), p.beta_m = 0.05f * std::pow(20.0f, r.uniform());

@@ -72,7 +72,7 @@ Resampled compared(const MeasuredLight& truth, const FiveLobes& model, std::size
         const ChannelLight& light = replicate(truth, k).channels[channel];
         const DirectionalDensity lobe = density_of(truth, light.scattered);
         Measures m;
-        m[whole] = squares(variants[0].value, 1, lobe.value, 1);
+        m[whole] = squares(variants[model.own()].value, 1, lobe.value, 1);
         if (energy > 0) {
             const double scale = light.scattered_energy() / energy;
             for (std::size_t v = 0; v < longitudinal_count; ++v)
@@ -118,7 +118,7 @@ LightError error_of(const MeasuredLight& truth, const FiveLobes& model, const st
         ChannelError e;
         for (std::size_t k = 0; k < class_count; ++k) e.truth[k] = energy_of(truth, c, k);
         e.scattered = scattered_of(truth, c), e.model = model.energy[c];
-        e.lobe = resampled[c].get(whole), e.shape = resampled[c].get(shape);
+        e.lobe = resampled[c].get(whole), e.shape = resampled[c].get(shape + model.own());
         e.cosine = resampled[c].get(house_cosine), e.sigma = resampled[c].between(authors_cosine, house_cosine);
         error.channels.push_back(e);
     }
@@ -148,7 +148,7 @@ LobePicture picture_of(const MeasuredLight& truth, const FiveLobes& model, std::
                        const OffsetRange& offsets) {
     LobePicture p;
     p.theta_i = theta_i, p.offsets = offsets;
-    p.model = model.scattered[channel][std::size_t(Longitudinal::house)];
+    p.model = model.scattered[channel][model.own()];
     p.cosine = model.scattered[channel][std::size_t(Longitudinal::house_cosine)];
     p.truth = density_of(truth, truth.all.channels[channel].scattered);
     for (std::size_t i = 0; i < p.truth.value.size(); ++i)
@@ -158,13 +158,13 @@ LobePicture picture_of(const MeasuredLight& truth, const FiveLobes& model, std::
 }
 
 /// The model for every inclination, one thread each.
-std::vector<std::vector<FiveLobes>> models(const Fibre& fibre, Reflectance model, const ErrorMapOptions& options,
+std::vector<std::vector<FiveLobes>> models(const Fibre& fibre, const ModelForm& form, const ErrorMapOptions& options,
                                            const ErrorMap& map) {
     std::vector<std::vector<FiveLobes>> all(map.theta_i.size());
     std::exception_ptr error;
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t t = 0; t < map.theta_i.size(); ++t) try {
-            all[t] = five_lobes(fibre, model, map.theta_i[t], map.offsets, options.theta_bins, options.phi_bins);
+            all[t] = five_lobes(fibre, form, map.theta_i[t], map.offsets, options.theta_bins, options.phi_bins);
             if (options.progress) options.progress();
         } catch (...) {
 #pragma omp critical
@@ -184,7 +184,7 @@ LightError light_error(const MeasuredLight& truth, const FiveLobes& model, doubl
 
 std::size_t map_cells(const ErrorMapOptions& options) { return options.inclinations * (options.offsets + 2); }
 
-ErrorMap error_map(const Fibre& fibre, Reflectance reflectance, const ErrorMapOptions& options) {
+ErrorMap error_map(const Fibre& fibre, const ModelForm& form, const ErrorMapOptions& options) {
     FibreOptions work;
     work.paths = options.paths, work.seed = options.seed, work.batches = options.batches;
     work.theta_bins = fine_theta, work.phi_bins = options.phi_bins;
@@ -194,7 +194,7 @@ ErrorMap error_map(const Fibre& fibre, Reflectance reflectance, const ErrorMapOp
     const double step = pi / double(options.inclinations + 1), width = 1 / double(options.offsets);
     for (std::size_t t = 0; t < options.inclinations; ++t) map.theta_i.push_back(double(t + 1) * step - pi / 2);
     for (std::size_t i = 0; i < options.offsets; ++i) map.offsets.push_back({double(i) * width, double(i + 1) * width});
-    const auto model = models(fibre, reflectance, options, map);
+    const auto model = models(fibre, form, options, map);
     Fibre smooth = fibre;
     smooth.alpha = smooth.beta_m = smooth.beta_n = 0;
     Fibre clear = smooth;  // the same R
@@ -257,7 +257,7 @@ ErrorMap error_map(const Fibre& fibre, Reflectance reflectance, const ErrorMapOp
                                   weight);
             }
             map.causes[c].R_smooth +=
-                weight * five_lobes(clear, Reflectance::exact, theta_i, {{0, 1}}, 1, 1)[0].energy[c][0];
+                weight * five_lobes(clear, {Reflectance::exact}, theta_i, {{0, 1}}, 1, 1)[0].energy[c][0];
         }
         map.far.push_back(error_of(far, far_model, resampled, theta_i, {0, 1}));
         add_directions(map.far.back(), far);

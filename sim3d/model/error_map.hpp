@@ -35,7 +35,7 @@ struct ChannelError {
     std::array<double, all_lobe_count> model = {};  ///< energies by Lobe
     Distance lobe;                                  ///< of the scattered lobe as it is
     Distance shape;   ///< of the model's scattered lobe times a factor that makes its energy the truth's
-    Distance cosine;  ///< the same with C^M times cos theta_r
+    Distance cosine;  ///< the same with C^M times cos theta_r, as the corrected form has it anyway
     /// Square of the same with C^M at sigma_ms kappa, minus that of `cosine`: linear in the truth, so that its noise
     /// has no bias to subtract. Above 0, sigma_ms kappa / cos theta_t is nearer to the truth.
     Estimate sigma;
@@ -66,7 +66,7 @@ struct Causes {
     Estimate entering;   ///< model - truth of the scattered energy, as far as the share of light that scatters differs
     Estimate absorbing;  ///< the rest of it: the share of the scattered light that is absorbed differs
     Estimate cortex_length, medulla_length;                    ///< mean lengths of a path of scattered light [radii]
-    double model_cortex_length = 0, model_medulla_length = 0;  ///< those that Eq. 20 assumes
+    double model_cortex_length = 0, model_medulla_length = 0;  ///< those that the model assumes
     double R_smooth = 0;  ///< energy of R of a smooth cuticle by the exact Fresnel term
 };
 
@@ -89,8 +89,8 @@ struct ErrorMap {
     Estimate lost;                      ///< energy of paths that were given up, see FibreProfile, worst cell
 };
 
-/// @param fibre the truth's, with the exact Fresnel term   @param model the model's Fresnel term
+/// @param fibre the truth's, with the exact Fresnel term
 /// The same arguments give the same bytes on one instruction set for any number of threads.
-ErrorMap error_map(const Fibre& fibre, Reflectance model, const ErrorMapOptions& options);
+ErrorMap error_map(const Fibre& fibre, const ModelForm& form, const ErrorMapOptions& options);
 
 }  // namespace medulla::sim3d

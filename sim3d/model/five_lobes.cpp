@@ -8,6 +8,7 @@
 #include "sim2d/disc/deterministic.hpp"
 #include "sim2d/quadrature.hpp"
 #include "sim2d/slab/deterministic.hpp"
+#include "sim3d/model/escape.hpp"
 
 namespace medulla::sim3d {
 namespace {
@@ -18,16 +19,30 @@ constexpr std::size_t per_bin = 8;  // of M over theta_r, likewise
 /// Absorption coefficients of one channel.
 struct Channel {
     double cortex, medulla;
+    double escapes = 1;  ///< corrected form: share that leaves the fibre of what left the medulla
 };
 
 /// What depends on theta_i alone.
 struct Section {
-    Section(const Fibre& f, Reflectance reflectance, double theta_i) : fibre(f) {
+    Section(const Fibre& f, const ModelForm& form, double theta_i)
+        : fibre(f), corrected(form.scattering == Scattering::corrected) {
         const double ci = std::cos(theta_i), eta = f.eta_c;
         prime = std::sqrt(eta * eta - std::pow(std::sin(theta_i), 2)) / ci;
         cos_t = std::sqrt(1 - std::pow(std::sin(theta_i) / eta, 2));
-        exact = reflectance == Reflectance::exact;
+        const bool exact = form.reflectance == Reflectance::exact;
         tilt = exact ? ci : 1, index = exact ? eta : prime;
+        if (!corrected) return;
+        const auto with = [&](double sigma_ma) {
+            Fibre g = f;
+            g.sigma_ma = sigma_ma;
+            return g;
+        };
+        kept = left_by_medulla(f);
+        for (const double sigma_ca : f.sigma_ca) escapes.push_back(escape(f, sigma_ca));
+        // Minus the derivatives of the energy by sigma_ca and by sigma_ma, where both are 0.
+        const double step = 1e-6;
+        cortex_return = (1 - escape(with(0), step)) / step;
+        medulla_return = (1 - escape(with(step), 0) * left_by_medulla(with(step))) / step;
     }
 
     /// Eq. 13 at the offset h: index eta' in the cross-section, or eta at the cosine cos theta_i cos gamma_i.
@@ -48,7 +63,9 @@ struct Section {
         const auto energies = [&](const Channel& a, double* A) {
             const double left = std::exp(-2 * (s_c * a.cortex + s_m * (a.medulla + fibre.sigma_ms)) / cos_t);
             const double T_b = std::exp(-(kappa * a.medulla + (1 - kappa) * a.cortex) / cos_t);
-            const double s = std::exp(-s_c * a.cortex / cos_t) * T_b * -std::expm1(-2 * s_m * fibre.sigma_ms / cos_t);
+            const double E = corrected ? -std::expm1(-2 * s_m * (fibre.sigma_ms + a.medulla) / cos_t)
+                                       : -std::expm1(-2 * s_m * fibre.sigma_ms / cos_t);
+            const double s = std::exp(-s_c * a.cortex / cos_t) * E * (corrected ? a.escapes : T_b);
             A[0] = f, A[1] = (1 - f) * (1 - f) * left, A[2] = A[1] * f * left;
             A[3] = meets_medulla(h) ? (1 - f) * s : 0, A[4] = A[3] * f * left;
             const double scatters = meets_medulla(h) ? s : 0;
@@ -57,7 +74,7 @@ struct Section {
         std::vector<std::array<double, 2>> scattered;
         for (std::size_t c = 0; c < fibre.sigma_ca.size(); ++c) {
             double A[all_lobe_count];
-            energies({fibre.sigma_ca[c], fibre.sigma_ma}, A);
+            energies({fibre.sigma_ca[c], fibre.sigma_ma, corrected ? kept * escapes[c] : 1}, A);
             for (std::size_t k = 0; k < all_lobe_count; ++k) lobes.energy[c][k] += weight * A[k];
             scattered.push_back({weight * A[3], weight * A[4]});
         }
@@ -65,8 +82,12 @@ struct Section {
         energies({0, 0}, A);
         for (std::size_t k = 0; k < all_lobe_count; ++k) lobes.white[k] += weight * A[k];
         const double both = A[3] + A[4];
-        lobes.cortex_length += weight * (both * (s_c + 1 - kappa) + A[4] * 2 * s_c) / cos_t;
-        lobes.medulla_length += weight * (both * kappa + A[4] * 2 * s_m) / cos_t;
+        const double crossed = std::exp(-2 * s_m * fibre.sigma_ms / cos_t);  // E falls by its slope along the chord
+        const double before = crossed < 1 ? -2 * s_m / cos_t * crossed / (1 - crossed) : 0;
+        const double cortex = corrected ? cortex_return : (1 - kappa) / cos_t,
+                     medulla = corrected ? medulla_return + before : kappa / cos_t;
+        lobes.cortex_length += weight * (both * (s_c / cos_t + cortex) + A[4] * 2 * s_c / cos_t);
+        lobes.medulla_length += weight * (both * medulla + A[4] * 2 * s_m / cos_t);
         return scattered;
     }
 
@@ -74,8 +95,10 @@ struct Section {
     double prime, cos_t;
 
   private:
-    bool exact;
+    bool corrected;
     double tilt, index;
+    double kept = 1, cortex_return = 0, medulla_return = 0;
+    std::vector<double> escapes;  ///< [channel]
 };
 
 struct Offset {
@@ -158,12 +181,17 @@ Fibre fibre_of(const FurParameters<3>& p, std::size_t channels) {
     return f;
 }
 
-std::vector<FiveLobes> five_lobes(const Fibre& f, Reflectance reflectance, double theta_i,
+ModelForm form_of(const FurParameters<3>& p) {
+    return {p.fresnel == Fresnel::exact ? Reflectance::exact : Reflectance::bravais, p.scattering};
+}
+
+std::vector<FiveLobes> five_lobes(const Fibre& f, const ModelForm& form, double theta_i,
                                   const std::vector<OffsetRange>& ranges, std::size_t theta_bins,
                                   std::size_t phi_bins) {
-    const Section section(f, reflectance, theta_i);
+    const Section section(f, form, theta_i);
     const std::size_t channels = f.sigma_ca.size();
     FiveLobes empty;
+    empty.form = form.scattering;
     empty.energy.assign(channels, {}), empty.scattered.assign(channels, {});
     for (auto& channel : empty.scattered)
         for (DirectionalDensity& d : channel) {

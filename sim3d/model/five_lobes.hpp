@@ -23,6 +23,14 @@ enum class Longitudinal {
 };
 inline constexpr std::size_t longitudinal_count = 4;
 
+/// The form of the model.
+struct ModelForm {
+    Reflectance reflectance = Reflectance::bravais;  ///< Fresnel term of Eq. 13
+    Scattering scattering = Scattering::published;   ///< energies of the scattered lobes, and which C^M they have
+};
+
+ModelForm form_of(const FurParameters<3>& p);
+
 /// A range of offsets in [0, 1], with uniform weight: low = high for one ray, 0 and 1 for the far field (then
 /// `folded`).
 struct OffsetRange {
@@ -31,20 +39,25 @@ struct OffsetRange {
 
 /// The mean of the lobes over one range of offsets.
 struct FiveLobes {
+    Scattering form = Scattering::published;
     /// Per channel: R, TT, TRT, TTs, TRTs, and the residual lobe of the runtime (docs/bcsdf.md).
     std::vector<std::array<double, all_lobe_count>> energy;
     std::array<double, all_lobe_count> white = {};  ///< energies without absorption
     /// Mean lengths of TTs and TRTs in cortex and medulla without absorption, over all light that meets the fibre
-    /// [radii]: the lengths that Eq. 20 assumes for absorption.
+    /// [radii]: the lengths that the form assumes for absorption.
     double cortex_length = 0, medulla_length = 0;
     /// Of TTs and TRTs, per channel and Longitudinal, averaged over bins; no errors. Zero where nothing scatters.
     std::vector<std::array<DirectionalDensity, longitudinal_count>> scattered;
+
+    /// The C^M of the form.
+    std::size_t own() const {
+        return std::size_t(form == Scattering::corrected ? Longitudinal::house_cosine : Longitudinal::house);
+    }
 };
 
-/// @param reflectance Fresnel term of the model's Eq. 13; that of `fibre` is not used   @param ranges of 0 <= low <=
-/// high <= 1
+/// @param fibre its own reflectance is not used   @param ranges of 0 <= low <= high <= 1
 /// @param theta_bins, phi_bins of `scattered`; phi_bins divides 1440
-std::vector<FiveLobes> five_lobes(const Fibre& fibre, Reflectance reflectance, double theta_i,
+std::vector<FiveLobes> five_lobes(const Fibre& fibre, const ModelForm& form, double theta_i,
                                   const std::vector<OffsetRange>& ranges, std::size_t theta_bins, std::size_t phi_bins);
 
 /// The mean over phi and -phi of every row, which is light at h and at -h.

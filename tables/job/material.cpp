@@ -77,6 +77,12 @@ Material material_of(const json& entry, const std::string& path, const std::stri
             fur.fresnel = value == "exact" ? Fresnel::exact : Fresnel::bravais;
             continue;
         }
+        if (key == "scattering") {
+            if (value != "published" && value != "corrected")
+                throw Error("{}: expected \"published\" or \"corrected\", found {}", field, quoted(value));
+            fur.scattering = value == "corrected" ? Scattering::corrected : Scattering::published;
+            continue;
+        }
         if (key == "sigma_ca") {
             material.grey = !value.is_array();
             if (value.is_array() && value.size() != 3)
@@ -101,7 +107,7 @@ Material material_of(const json& entry, const std::string& path, const std::stri
         if (!known)
             throw Error(
                 "{}: no such field; expected name, preset, eta, kappa, alpha, beta_m, beta_n, layers, sigma_ca, "
-                "sigma_ms, sigma_ma, g or fresnel",
+                "sigma_ms, sigma_ma, g, fresnel or scattering",
                 field);
     }
     return material;
@@ -113,7 +119,7 @@ Material preset_material(const std::string& name, const std::string& where) {
     if (const FurPreset* preset = find_preset(name.c_str())) return {name, parameters_of<3>(*preset), true};
     std::string names;
     for (const FurPreset& preset : fur_presets) names += std::string(names.empty() ? "" : ", ") + preset.name;
-    throw Error("{}: expected one of {}; found '{}'", where, names, name);
+    throw Error("{}: expected one of {}, each also with _corrected; found '{}'", where, names, name);
 }
 
 Material read_material(const std::string& path) { return parse_material(read_text(path), path); }

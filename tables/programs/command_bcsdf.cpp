@@ -14,7 +14,7 @@ namespace medulla::tables {
 namespace {
 
 struct BcsdfArguments {
-    std::string preset, material, range, pack = "default", form;
+    std::string preset, material, range, pack = "default", form, scattering;
     double theta_i = 0, theta_r = 0, phi = 0, h = 0;
     bool far = false, json = false;
     const CLI::Option* h_given = nullptr;
@@ -96,6 +96,8 @@ void run_bcsdf(const BcsdfArguments& args) {
     } else {
         material = read_material(args.material);
     }
+    if (!args.scattering.empty())
+        material.fur.scattering = args.scattering == "corrected" ? Scattering::corrected : Scattering::published;
     const std::vector<unsigned char> bytes = read_pack(args.pack);
     const PackView pack = open_pack(bytes.data(), bytes.size()).pack;
     const double radians = pi / 180, theta_i = args.theta_i * radians;
@@ -154,14 +156,14 @@ double as_printed(float x) { return std::stod(fmt::format("{}", x)); }
 
 void run_presets(const PresetArguments& args) {
     nlohmann::ordered_json json = nlohmann::ordered_json::array();
-    constexpr const char* line = "{:<10} {:>6} {:>6} {:>6} {:>7} {:>7} {:>8} {:>8} {:>8} {:>5} {:>6}\n";
+    constexpr const char* line = "{:<19} {:>6} {:>6} {:>6} {:>7} {:>7} {:>8} {:>8} {:>8} {:>5} {:>6}\n";
     if (!args.json) {
         print(line, "name", "kappa", "eta", "alpha", "beta_m", "beta_n", "sigma_ca", "sigma_ms", "sigma_ma", "g",
               "layers");
         // Sigmas are per fibre radius.
         print(line, "", "", "", "deg", "deg", "deg", "1/r", "1/r", "1/r", "", "");
     }
-    for (const FurPreset& p : fur_presets) {
+    const auto add = [&](const FurPreset& p) {
         json.push_back({{"name", p.name},
                         {"kappa", as_printed(p.kappa)},
                         {"eta", as_printed(p.eta)},
@@ -172,11 +174,15 @@ void run_presets(const PresetArguments& args) {
                         {"sigma_ms", as_printed(p.sigma_ms)},
                         {"sigma_ma", as_printed(p.sigma_ma)},
                         {"g", as_printed(p.g)},
-                        {"layers", as_printed(p.layers)}});
+                        {"layers", as_printed(p.layers)},
+                        {"fresnel", p.scattering == Scattering::corrected ? "exact" : "bravais"},
+                        {"scattering", p.scattering == Scattering::corrected ? "corrected" : "published"}});
         if (!args.json)
             print(line, p.name, p.kappa, p.eta, p.alpha, p.beta_m, p.beta_n, p.sigma_ca, p.sigma_ms, p.sigma_ma, p.g,
                   p.layers);
-    }
+    };
+    for (const FurPreset& p : fur_presets) add(p);
+    for (const FurPreset& p : corrected_presets) add(p);
     if (args.json) print("{}\n", json_line(nlohmann::ordered_json{{"presets", json}}));
 }
 
@@ -205,6 +211,10 @@ void add_bcsdf(CLI::App& app, Action& action) {
                 ->capture_default_str();
             command.add_option("--form", args.form, "published: the five lobes of Eq. 12, without the residual lobe")
                 ->check(CLI::IsMember({"published"}));
+            command
+                .add_option("--scattering", args.scattering,
+                            "form of the scattered lobes, published or corrected; without: the material's")
+                ->check(CLI::IsMember({"published", "corrected"}));
             command.add_flag("--json", args.json, "print one JSON object");
         },
         run_bcsdf);
@@ -212,7 +222,8 @@ void add_bcsdf(CLI::App& app, Action& action) {
 
 void add_presets(CLI::App& app, Action& action) {
     add_command<PresetArguments>(
-        app, action, "presets", "the animals of Table 4 (angles in degrees, sigma per fibre radius)",
+        app, action, "presets",
+        "the animals of Table 4, and those fitted for the corrected form (angles in degrees, sigma per fibre radius)",
         [](CLI::App& command, PresetArguments& args) {
             command.add_flag("--json", args.json, "print one JSON object");
         },

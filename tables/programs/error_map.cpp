@@ -88,9 +88,8 @@ void run_error_map(const ErrorMapArguments& args) {
         const EndedBySignals signals;
         Progress progress(args.progress, "error map", sim3d::map_cells(options));
         options.progress = [&] { progress.add(1); };
-        const auto model =
-            title.material.fur.fresnel == Fresnel::exact ? sim3d::Reflectance::exact : sim3d::Reflectance::bravais;
-        map = sim3d::error_map(sim3d::fibre_of(title.material.fur, title.channels()), model, options);
+        const FurParameters<3>& fur = title.material.fur;
+        map = sim3d::error_map(sim3d::fibre_of(fur, title.channels()), sim3d::form_of(fur), options);
     }
     output.write(error_map_page(title, map));
     if (args.json) return print("{}\n", json_line(error_map_json(title, map)));

@@ -79,7 +79,8 @@ ordered_json error_map_json(const ErrorMapTitle& title, const sim3d::ErrorMap& m
                         {"sigma_ms", p.sigma_ms},
                         {"sigma_ma", p.sigma_ma},
                         {"g", p.g},
-                        {"fresnel", p.fresnel == Fresnel::exact ? "exact" : "bravais"}};
+                        {"fresnel", p.fresnel == Fresnel::exact ? "exact" : "bravais"},
+                        {"scattering", p.scattering == Scattering::corrected ? "corrected" : "published"}};
     for (std::size_t c = 0; c < title.channels(); ++c) {
         json["material"]["sigma_ca"].push_back(p.sigma_ca[c]);
         json["channels"].push_back(title.channel(c));

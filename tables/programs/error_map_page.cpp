@@ -151,8 +151,8 @@ std::string causes_of_energy(const ChannelError& all, const sim3d::Causes& c) {
         row("how much light scatters at all", c.entering.value, c.entering.error,
             "cuticle and higher orders: all of the difference if nothing absorbed", "part") +
         row("how much of that is absorbed", c.absorbing.value, c.absorbing.error,
-            "T<sub>b</sub> of Eq. 20 lets scattered light leave at once; in the fibre it may meet the cuticle beyond "
-            "the critical angle and stay in",
+            "T<sub>b</sub> of Eq. 20, the published form, lets scattered light leave at once; in the fibre it may meet "
+            "the cuticle beyond the critical angle and stay in",
             "part") +
         row("R", all.model[0] - R.value, R.error, "") +
         row("the Fresnel term", all.model[0] - c.R_smooth, 0,
@@ -161,14 +161,14 @@ std::string causes_of_energy(const ChannelError& all, const sim3d::Causes& c) {
             "part") +
         row("tilt and roughness of the cuticle", c.R_smooth - R.value, R.error, "the rest of the difference", "part") +
         "</tbody></table></div>";
-    return table + fmt::format(
-                       "<p>A path of scattered light is {:.2f} <small>{}</small> radii long in the cortex and {:.2f} "
-                       "<small>{}</small> in the medulla, had nothing absorbed; Eq. 20 takes {:.2f} and {:.2f}. Of all "
-                       "light, {:.4f} <small>{}</small> leaves after a reflection inside that follows a "
-                       "collision.</p>",
-                       c.cortex_length.value, noise(c.cortex_length.error), c.medulla_length.value,
-                       noise(c.medulla_length.error), c.model_cortex_length, c.model_medulla_length, sR.value,
-                       noise(sR.error));
+    return table +
+           fmt::format(
+               "<p>A path of scattered light is {:.2f} <small>{}</small> radii long in the cortex and {:.2f} "
+               "<small>{}</small> in the medulla, had nothing absorbed; the model takes {:.2f} and {:.2f}. Of all "
+               "light, {:.4f} <small>{}</small> leaves after a reflection inside that follows a "
+               "collision.</p>",
+               c.cortex_length.value, noise(c.cortex_length.error), c.medulla_length.value,
+               noise(c.medulla_length.error), c.model_cortex_length, c.model_medulla_length, sR.value, noise(sR.error));
 }
 
 /// A number for a cell of a map, with its noise below.
@@ -271,8 +271,8 @@ std::string maps(const sim3d::ErrorMap& map, std::size_t channel) {
 
 std::string far_field(const sim3d::ErrorMap& map, std::size_t channel) {
     std::string rows;
-    PageCurve curves[] = {{"truth", "truth"}, {"model", "model"},        {"truth", "truth"},
-                          {"model", "model"}, {"as published", "model"}, {"with cos θ<sub>r</sub>", "cosine"}};
+    PageCurve curves[] = {{"truth", "truth"}, {"model", "model"}, {"truth", "truth"},
+                          {"model", "model"}, {"model", "model"}, {"with cos θ<sub>r</sub>", "cosine"}};
     for (const auto& light : map.far) {
         const ChannelError& e = light.channels[channel];
         const double theta = light.theta_i * degrees;
@@ -354,10 +354,11 @@ std::string work(const ErrorMapTitle& title, const sim3d::ErrorMap& map) {
     for (std::size_t c = 1; c < title.channels(); ++c) sigma_ca += fmt::format(", {:.4g}", p.sigma_ca[c]);
     std::string html = fmt::format(
         "<p>κ {:.4g}, η {:.4g}, α {:.4g}°, β<sub>m</sub> {:.4g}°, β<sub>n</sub> {:.4g}°, {:.4g} layers, σ<sub>ca</sub> "
-        "{}, σ<sub>ms</sub> {:.4g}, σ<sub>ma</sub> {:.4g} per fibre radius, g {:.4g}; {} Fresnel term in the "
-        "model.</p>",
+        "{}, σ<sub>ms</sub> {:.4g}, σ<sub>ma</sub> {:.4g} per fibre radius, g {:.4g}. Model: {} Fresnel "
+        "term, {} form of the scattered lobes.</p>",
         p.kappa, p.eta, double(p.alpha) * degrees, double(p.beta_m) * degrees, double(p.beta_n) * degrees, p.layers,
-        sigma_ca, p.sigma_ms, p.sigma_ma, p.g, p.fresnel == Fresnel::exact ? "exact" : "published");
+        sigma_ca, p.sigma_ms, p.sigma_ma, p.g, p.fresnel == Fresnel::exact ? "exact" : "published",
+        p.scattering == Scattering::corrected ? "corrected" : "published");
     html += fmt::format(
         "<p>Truth: {:.3g} million paths through the fibre in three dimensions (smooth fibre included), {} for each "
         "cell of the "

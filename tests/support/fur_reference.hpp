@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "medulla/fur_parameters.hpp"
@@ -28,7 +29,7 @@ struct Medulla {
 
 class Factors : public Medulla {
   public:
-    explicit Factors(const PackView& pack) : pack_(pack) {}
+    explicit Factors(const PackView& pack, Scattering form = Scattering::published) : pack_(pack), form_(form) {}
     bool absorbs() const override { return medulla::absorbs(pack_); }
     double survival(double sigma, double g, double h, double absorption) const override {
         return double(medulla::survival(pack_, float(sigma), float(g), float(h), float(absorption)));
@@ -40,11 +41,28 @@ class Factors : public Medulla {
         return double(lobe(table, contract(table, q), float(y)));
     }
     double longitudinal(Side side, double sigma, double g, double theta_i, double theta_r) const override {
-        return double(medulla::longitudinal(pack_, side, float(sigma), float(g), float(theta_i), float(theta_r)));
+        const auto density = [&](double theta) {
+            return double(medulla::longitudinal(pack_, side, float(sigma), float(g), float(theta_i), float(theta)));
+        };
+        if (form_ == Scattering::published) return density(theta_r);
+        const std::array<double, 4> row = {double(side), sigma, g, theta_i};
+        if (row != row_[std::size_t(side)]) {
+            constexpr int n = 2000;
+            double sum = 0;
+            for (int i = 0; i < n; ++i) {
+                const double theta = pi * ((i + 0.5) / n - 0.5);
+                sum += std::max(0.0, density(theta)) * std::cos(theta) * pi / n;
+            }
+            row_[std::size_t(side)] = row, integral_[std::size_t(side)] = sum;
+        }
+        return density(theta_r) * std::cos(theta_r) / integral_[std::size_t(side)];
     }
 
   private:
     PackView pack_;
+    Scattering form_;
+    mutable std::array<std::array<double, 4>, 2> row_ = {};  ///< whose integral was taken last, of either side
+    mutable double integral_[2] = {};
 };
 
 /// Reads dense tables in the plainest way: every axis by its breakpoints, every row as a spline of its own.
@@ -174,6 +192,44 @@ inline double residual_energy(double F, double scattered, double through) {
     return sum;
 }
 
+/// 1 - exp(-x)
+inline double gone(double x) { return -std::expm1(-x); }
+
+/// The corrected form: of the light that collides in the medulla and is not absorbed there, the share that leaves it.
+inline double left_by_medulla(const FurParameters<3>& p) {
+    const double kappa = double(p.kappa), ms = double(p.sigma_ms), ma = double(p.sigma_ma), narrow = 1 - double(p.g);
+    const double tau = ms * kappa;
+    const double path = kappa * (4 / 3.0 + 1.431 * tau + 2.898 * tau * tau) / (1 + 1.44 * tau + 1.449 * tau * tau);
+    return ms / (ms + ma) * std::exp(-std::log1p(path * ma * narrow) / narrow);
+}
+
+/// The corrected form: the share of what left the medulla that leaves the fibre in the end, by the four directions of
+/// docs/bcsdf.md, 'Escape and return'.
+inline double escape(const FurParameters<3>& p, double sigma_ca) {
+    const double eta = double(p.eta), kappa = double(p.kappa), ms = double(p.sigma_ms), all = ms + double(p.sigma_ma);
+    const double offset[] = {0.57, 0.60, 0.51, 0.89}, place[] = {0.84, 0.12, 0.63, 0.99},
+                 weight[] = {0.17, 0.83, 0.71, 0.29}, kept = left_by_medulla(p);
+    double out = 0, sum = 0;
+    for (int i = 0; i < 4; ++i) {
+        const bool escapes = i < 2;
+        const double widest = escapes ? std::min(kappa, 1 / eta) : kappa, b = widest * offset[i];
+        const double cos_b = std::sqrt(1 - b * b), half = std::sqrt(kappa * kappa - b * b);
+        const double critical = std::min(1.0, std::sqrt(1 - 1 / (eta * eta)) / cos_b), angle = std::acos(critical);
+        const double zone = 0.5 * (angle + std::sin(angle) * critical);
+        const double cos_theta = escapes ? 1 - (1 - critical) * place[i] : critical * place[i];
+        const double F = escapes
+                             ? cuticle_reflectance(eta, std::asin(eta * std::sqrt(1 - std::pow(cos_theta * cos_b, 2))),
+                                                   double(p.layers))
+                             : 1;
+        const double chord = 2 * half / cos_theta, cortex = (cos_b - half) / cos_theta * sigma_ca;
+        const double share = widest * weight[i] * (escapes ? zone : pi / 4 - zone) * gone(ms * chord) /
+                             (1 - F * std::exp(-2 * cortex - all * chord));
+        out += share * (1 - F) * std::exp(-cortex);
+        sum += share * (1 - F + F * (gone(2 * cortex) + std::exp(-2 * cortex) * gone(all * chord) * (1 - kept)));
+    }
+    return out / sum;
+}
+
 /// The cross-section of a ray.
 struct Ray {
     double sigma, absorption, h_medulla;  ///< where the medulla's tables are read; h < 0 on the other side
@@ -194,15 +250,19 @@ inline Ray trace(const FurParameters<3>& p, const Medulla* medulla, double theta
             ? cuticle_reflectance(eta, std::acos(std::cos(theta_i) * std::cos(ray.gamma_i)), double(p.layers))
             : cuticle_reflectance(index, ray.gamma_i, double(p.layers));
     const bool tabled = medulla != nullptr && medulla->absorbs();  // they know what it absorbs; else T_b has it
+    const bool corrected = p.scattering == Scattering::corrected;
     if (medulla != nullptr && std::abs(inside) < kappa && ms > 0) {
         ray.sigma = ms * kappa / cos_t, ray.absorption = tabled ? ma * kappa / cos_t : 0;
         ray.h_medulla = std::min(1.0, std::abs(inside) / kappa);
-        ray.scattered_share = 1 - std::exp(-2 * s_m * ms / cos_t);
+        const bool first = corrected && !tabled;  // the medulla's absorption up to where light leaves it first
+        ray.scattered_share = gone(2 * s_m * (first ? ms + ma : ms) / cos_t) * (first ? left_by_medulla(p) : 1);
         if (tabled) ray.scattered_share *= medulla->survival(ray.sigma, double(p.g), ray.h_medulla, ray.absorption);
     }
     for (int c = 0; c < 3; ++c) {
         const double ca = double(p.sigma_ca[c]),
-                     T_b = std::exp(-((tabled ? 0 : kappa * ma) + (1 - kappa) * ca) / cos_t);
+                     T_b = !(ray.scattered_share > 0) ? 1
+                           : corrected                ? escape(p, ca)
+                                       : std::exp(-((tabled ? 0 : kappa * ma) + (1 - kappa) * ca) / cos_t);
         const double through = std::exp(-2 * (s_c * ca + s_m * (ma + ms)) / cos_t);
         const double share = std::exp(-s_c * ca / cos_t) * T_b * ray.scattered_share;
         ray.A[0][c] = F;
@@ -226,7 +286,7 @@ inline Lobes near_lobes(const FurParameters<3>& p, const Medulla* medulla, doubl
     for (int k = 0; k < 3; ++k)
         density[k] =
             wrapped(phi - (2 * k * ray.gamma_t - 2 * ray.gamma_i + k * pi), std::sqrt(k + 1.0) * double(p.beta_n));
-    if (ray.scattered_share > 0) {
+    if (medulla != nullptr && ray.scattered_share > 0) {
         const double side = h < 0 ? -1 : 1, tilt = theta_i < 0 ? -1 : 1, g = double(p.g);
         for (int k = 1; k <= 2; ++k) {
             const double centre = (ray.gamma_t - ray.gamma_i) + (k - 1) * (pi + 2 * ray.gamma_t);

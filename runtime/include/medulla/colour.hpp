@@ -5,6 +5,7 @@
 
 #include "medulla/config.hpp"
 #include "medulla/detail/cross_section.hpp"
+#include "medulla/detail/escape.hpp"
 #include "medulla/detail/math.hpp"
 #include "medulla/fur_parameters.hpp"
 
@@ -87,6 +88,8 @@ class FibreAlbedo {
             for (int k = 0; k < offsets; ++k) set(p, i, k, nodes_[i * offsets + k]);
         // Mean cosine of what a medulla scatters, over all directions of the light, by its optical radius for
         // transport: fitted to near fields of the default pack, 440 random fibres, standard deviation 0.015.
+        p_.eta = p.eta, p_.kappa = p.kappa, p_.layers = p.layers, p_.g = p.g, p_.scattering = p.scattering;
+        p_.sigma_ms = p.sigma_ms, p_.sigma_ma = p.sigma_ma;
         const float g = p.g, t = 1 / (1 + p.sigma_ms * p.kappa * (1 - g));
         scattered_cosine_ =
             -0.4506f + t * (1.3747f - 1.052f * t) + g * (0.1913f - 0.2052f * g + t * (-0.4544f + 1.5262f * t));
@@ -127,12 +130,16 @@ class FibreAlbedo {
         const detail::Inclination<float> at = detail::inclination(p.eta, cos_i, p.fresnel);
         const detail::Path<float> path =
             detail::trace(at, p.kappa, p.layers, detail::math::sin(gamma), detail::math::cos(gamma));
-        const float depth = 2 * path.s_m * p.sigma_ms * at.inverse_cos_t;
+        const bool corrected = p.scattering == Scattering::corrected;
+        const float chord = 2 * path.s_m * at.inverse_cos_t;
         node.F = path.cuticle.F;
         node.through = detail::math::exp(-2 * path.s_m * (p.sigma_ms + p.sigma_ma) * at.inverse_cos_t);
         node.through_length = 2 * path.s_c * at.inverse_cos_t;
-        node.scattered = -detail::math::expm1(-depth) * detail::math::exp(-p.kappa * p.sigma_ma * at.inverse_cos_t);
-        node.scattered_length = (path.s_c + 1 - p.kappa) * at.inverse_cos_t;
+        node.scattered = corrected ? -detail::math::expm1(-chord * (p.sigma_ms + p.sigma_ma)) *
+                                         detail::left_by_medulla(p.kappa, p.sigma_ms, p.sigma_ma, p.g)
+                                   : -detail::math::expm1(-chord * p.sigma_ms) *
+                                         detail::math::exp(-p.kappa * p.sigma_ma * at.inverse_cos_t);
+        node.scattered_length = (corrected ? path.s_c : path.s_c + 1 - p.kappa) * at.inverse_cos_t;
         const float shift[3] = {1, -0.5f, -1.5f}, rough[3] = {1, 0.5f, 1.5f};
         for (int lobe = 0; lobe < 3; ++lobe) {
             const float m = rough[lobe] * p.beta_m;
@@ -145,11 +152,21 @@ class FibreAlbedo {
         node.residual_cosine = detail::math::cos(2.5f * p.alpha) * detail::math::exp(-0.5f * m * m) * sin_i * sin_i;
     }
 
+    /// Share of the scattered light that leaves, where T_b does not have it.
+    MEDULLA_FN float escape(float sigma_ca) const noexcept {
+        if (p_.scattering == Scattering::published || !(p_.kappa > 0 && p_.sigma_ms > 0)) return 1;
+        const float channel[4] = {sigma_ca};
+        detail::ScatteredEnergy<4> energy;
+        detail::set_corrected(p_, channel, false, energy);
+        return energy.escape[0];
+    }
+
     MEDULLA_FN Light at(float sigma_ca) const noexcept {
         Light sum = {0, 0};
+        const float escapes = escape(sigma_ca);
         for (const Node& n : nodes_) {
             const float T = 1 - n.F, through = n.through * detail::math::exp(-n.through_length * sigma_ca);
-            const float scattered = n.scattered * detail::math::exp(-n.scattered_length * sigma_ca);
+            const float scattered = escapes * n.scattered * detail::math::exp(-n.scattered_length * sigma_ca);
             const float TT = T * T * through, TRT = TT * n.F * through;
             const float TTs = T * scattered, TRTs = TTs * n.F * through;
             // Energies of detail/cross_section.hpp, whose exponents in sigma_ca are kept apart here.
@@ -162,6 +179,7 @@ class FibreAlbedo {
         return sum;
     }
 
+    FurParameters<1> p_;
     Node nodes_[inclinations * offsets];
     float scattered_cosine_;
 };

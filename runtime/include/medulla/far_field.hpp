@@ -77,6 +77,14 @@ static_assert(sizeof(FarField<3>) <= 2048, "a far field fits into a GPU thread")
 
 namespace detail {
 
+/// The corrected form in place of T_b.
+template <int Channels>
+MEDULLA_FN void use_escape(const ScatteredEnergy<channel_lanes<Channels>>& leaves, FarField<Channels>& field) noexcept {
+    Absorption<Channels>& a = field.absorption;
+    a.collisions = leaves.collisions * field.inclination.inverse_cos_t, a.kept = leaves.kept;
+    for (int c = 0; c < Channels; ++c) a.T_b[c] = leaves.escape[c];
+}
+
 template <int Channels>
 MEDULLA_FN FarField<Channels> make_far(const Fibre<Channels>& fibre, const Polar& known, Offsets range,
                                        FarQuality quality) noexcept {
@@ -90,6 +98,7 @@ MEDULLA_FN FarField<Channels> make_far(const Fibre<Channels>& fibre, const Polar
     begin_field(fibre, field.inclination, field.known_theta, field);
     field.absorption =
         detail::absorption(p, field.inclination.inverse_cos_t, fibre.tables != nullptr && fibre.tables->absorbs);
+    if (fibre.tables != nullptr && p.scattering == Scattering::corrected) use_escape(fibre.scattered, field);
     field.absorbed = p.sigma_ma * p.kappa * field.inclination.inverse_cos_t;
     field.kappa = p.kappa, field.layers = p.layers, field.g = p.g;
     field.quality = static_cast<int>(quality);

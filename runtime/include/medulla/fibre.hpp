@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "medulla/config.hpp"
+#include "medulla/detail/escape.hpp"
 #include "medulla/detail/gaussian.hpp"
 #include "medulla/detail/table_lookup.hpp"
 #include "medulla/fur_parameters.hpp"
@@ -20,6 +21,7 @@ enum class FibreStatus : std::uint32_t {
     clamped_parameters,  ///< usable: parameters out of range were brought into it, as asked; out_of_range says which
     beyond_tables,       ///< usable: g or the optical radius is outside the tables' ranges and clamped to them
     no_tables,           ///< usable: kappa > 0 and sigma_ms > 0, but there are no tables: scattered lobes are absent
+    other_form,          ///< usable: the tables have the other form of the scattered lobes, which are absent
     bad_parameters,      ///< black: out_of_range says which parameters are out of their ranges
 };
 
@@ -33,6 +35,8 @@ MEDULLA_FN const char* describe(FibreStatus status) noexcept {
             return "g or the optical radius is outside the tables' ranges, and is clamped to them";
         case FibreStatus::no_tables:
             return "no tables: scattered lobes are absent";
+        case FibreStatus::other_form:
+            return "the tables are those of the other form (FurParameters::scattering): scattered lobes are absent";
         case FibreStatus::bad_parameters:
             return "parameters are out of their ranges: the fibre is black";
     }
@@ -41,14 +45,6 @@ MEDULLA_FN const char* describe(FibreStatus status) noexcept {
 
 /// What make_fibre does with parameters out of their ranges.
 enum class OutOfRange : std::uint32_t { black, clamp };
-
-namespace detail {
-
-/// Floats in which one number a channel stands beside one more: a multiple of four.
-template <int Channels>
-inline constexpr int channel_lanes = 4 * (Channels / 4 + 1);
-
-}  // namespace detail
 
 template <int Channels = 3>
 struct Fibre {
@@ -62,6 +58,7 @@ struct Fibre {
     alignas(16) float sigma_ca[std::size_t(detail::channel_lanes<Channels>)] = {};  ///< the parameters', padded with 0
     alignas(16) float g_weight[4] = {};                                             ///< of rows of g
     std::uint32_t g_count = 0, g_first = 0;
+    detail::ScatteredEnergy<detail::channel_lanes<Channels>> scattered = {};
 };
 static_assert(sizeof(Fibre<3>) <= 256, "a fibre fits into a closure");
 
@@ -94,7 +91,15 @@ MEDULLA_FN Fibre<Channels> make_fibre(const FurParameters<Channels>& parameters,
         return f;
     }
     assert(tables->magic == tables_magic && "the memory of a fibre's tables is gone or was overwritten");
+    if (tables->ranges.forms != form_bit(p.scattering)) {
+        f.status = FibreStatus::other_form;
+        return f;
+    }
     f.tables = tables;
+    if (p.scattering == Scattering::corrected)
+        detail::run_fused([&] { detail::set_corrected(p, f.sigma_ca, tables->absorbs != 0, f.scattered); });
+    else
+        detail::set_published(p, tables->absorbs != 0, f.scattered);
     detail::TableRows at;
     detail::set_g(tables->g, tables->g_rows, p.g, at);
     f.g_count = at.g_count, f.g_first = at.g_first;

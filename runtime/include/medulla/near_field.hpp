@@ -306,19 +306,21 @@ namespace detail {
 /// the energy, averaged over channels. The formulas are those of energies() in cross_section.hpp.
 template <int Channels>
 MEDULLA_HOT void set_energies(const Fibre<Channels>& fibre, const Path<float>& path, float inverse_cos_t,
-                              bool scattered, float survival, bool tabled, NearField<Channels>& hit) noexcept {
+                              bool scattered, float survival, NearField<Channels>& hit) noexcept {
     constexpr int lanes = NearField<Channels>::lanes;
     const FurParameters<Channels>& p = fibre.parameters;
     const float F = path.cuticle.F, T = path.cuticle.T_, s_m = path.s_m * inverse_cos_t, s_c = path.s_c * inverse_cos_t;
-    const float depth = 2 * p.sigma_ms * s_m, medulla = (p.sigma_ms + p.sigma_ma) * s_m;
-    const float E = scattered ? absorbed(depth, exponential(-depth)) * survival : 0.0f;
-    const float out = (1 - p.kappa) * inverse_cos_t, inside = tabled ? 0.0f : p.kappa * p.sigma_ma * inverse_cos_t;
+    const auto& leaves = fibre.scattered;
+    const float depth = 2 * leaves.collisions * s_m, medulla = (p.sigma_ms + p.sigma_ma) * s_m;
+    const float E = scattered ? absorbed(depth, exponential(-depth)) * survival * leaves.kept : 0.0f;
+    const float out = leaves.cortex * inverse_cos_t, inside = leaves.medulla * inverse_cos_t;
     Four mean[all_lobe_count];
     for (int b = 0; b < lanes; b += 4) {
         const Four sigma = aligned_four_at(fibre.sigma_ca + b), cortex = Four(s_c) * sigma;
         const Four half = cortex + Four(medulla), crossing = half + half;  // lengths of half a crossing and of a whole
         const Four through = exponential(-crossing);
-        const Four share = exponential(-(cortex + Four(out) * sigma + Four(inside))) * Four(E);
+        const Four share =
+            exponential(-(cortex + Four(out) * sigma + Four(inside))) * Four(E) * aligned_four_at(leaves.escape + b);
         const Four TT = Four(T * T) * through, again = Four(F) * through, TTs = Four(T) * share;
         const Four stays = Four(T) + Four(F) * absorbed(crossing, through);
         const FourMask some = stays > Four(0.0f);
@@ -374,7 +376,7 @@ MEDULLA_HOT NearField<Channels> make_near(const Fibre<Channels>& fibre, const Po
         if (tabled)
             survival = survival_of(p.sigma_ma * p.kappa * at.inverse_cos_t, survival_length(*hit.tables, hit.rows));
     }
-    set_energies(fibre, path, at.inverse_cos_t, inside, survival, tabled, hit);
+    set_energies(fibre, path, at.inverse_cos_t, inside, survival, hit);
     return hit;
 }
 

@@ -30,7 +30,11 @@ struct TableRanges {
     /// Of one material its index [1]: the optical radius at theta_i is then sigma_low / cos theta_t, which leaves C^M a
     /// table over (theta_i; theta_r). Anything else, such as 0, and ends that are not one material's leave sigma free.
     float eta = 0;
+    std::uint32_t forms = 1;  ///< form_bit of the materials' Scattering; tables have one form
 };
+MEDULLA_FN constexpr std::uint32_t form_bit(Scattering scattering) noexcept {
+    return scattering == Scattering::corrected ? 2u : 1u;
+}
 
 /// The ranges that one material needs: its g, and sigma_ms kappa to sigma_ms kappa eta / sqrt(eta^2 - 1) over all
 /// theta_i.
@@ -38,7 +42,13 @@ template <int Channels>
 MEDULLA_FN TableRanges ranges_of(const FurParameters<Channels>& p) noexcept {
     const float radius = p.sigma_ms * p.kappa;
     const float longest = p.eta / detail::math::sqrt((p.eta - 1) * (p.eta + 1));  // 1 / cos theta_t at grazing
-    return {p.g, p.g, radius, radius * longest, p.sigma_ms > 0 ? p.sigma_ma / p.sigma_ms : 0.0f, p.eta};
+    return {p.g,
+            p.g,
+            radius,
+            radius * longest,
+            p.sigma_ms > 0 ? p.sigma_ma / p.sigma_ms : 0.0f,
+            p.eta,
+            form_bit(p.scattering)};
 }
 /// The ranges that cover both. The absorption is a's: where the pack has an axis of it, materials that share tables
 /// have the same sigma_ma / sigma_ms.
@@ -48,7 +58,8 @@ MEDULLA_FN TableRanges join(const TableRanges& a, const TableRanges& b) noexcept
             a.sigma_low < b.sigma_low ? a.sigma_low : b.sigma_low,
             a.sigma_high > b.sigma_high ? a.sigma_high : b.sigma_high,
             a.absorption,
-            a.eta < b.eta || a.eta > b.eta ? 0.0f : a.eta};
+            a.eta < b.eta || a.eta > b.eta ? 0.0f : a.eta,
+            a.forms | b.forms};
 }
 
 /// Dense tables as they lie in memory; made by make_tables. Arrays follow the struct.
@@ -78,14 +89,15 @@ struct DenseTables {
     MEDULLA_HOT std::uint32_t longitudinal_side() const noexcept { return one_material ? theta_i.rows : sigma.rows; }
     MEDULLA_HOT std::uint32_t longitudinal_planes() const noexcept { return one_material ? 1 : g_rows * theta_i.rows; }
 };
-static_assert(sizeof(DenseTables) == 288, "one layout everywhere");
-inline constexpr std::uint64_t tables_magic = 0x314c42544c44454du;  // "MEDLTBL1"
+static_assert(sizeof(DenseTables) == 296, "one layout everywhere");
+inline constexpr std::uint64_t tables_magic = 0x324c42544c44454du;  // "MEDLTBL2"
 
 enum class TablesStatus {
     ok,
     no_azimuthal_table,
     no_longitudinal_table,
     bad_ranges,  ///< a range that is empty, not finite, or wholly outside the pack's axes
+    two_forms,   ///< materials of both forms of the scattered lobes, or of none
     bad_axes,    ///< the pack's two longitudinal tables have different axes, or an axis is too finely divided
     null_memory,
     unaligned_memory,
@@ -103,6 +115,8 @@ MEDULLA_FN const char* describe(TablesStatus status) noexcept {
             return "the pack lacks a longitudinal table";
         case TablesStatus::bad_ranges:
             return "a range of g or sigma is empty, not finite, or outside the pack's axes";
+        case TablesStatus::two_forms:
+            return "materials of the published and of the corrected form cannot share tables";
         case TablesStatus::bad_axes:
             return "the pack's tables have axes that dense tables cannot share";
         case TablesStatus::null_memory:

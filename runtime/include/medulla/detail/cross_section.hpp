@@ -138,8 +138,9 @@ MEDULLA_FN T scattered_centre(int p, T gamma_i, T gamma_t) noexcept {
 /// What the inclination decides for attenuation: coefficients over cos theta_t and T_b of Eq. 20.
 template <int Channels, class T = float>
 struct Absorption {
-    T medulla_extinction;             ///< (sigma_ma + sigma_ms) / cos theta_t
-    T medulla_scattering;             ///< sigma_ms / cos theta_t
+    T medulla_extinction;  ///< (sigma_ma + sigma_ms) / cos theta_t
+    T collisions;  ///< rate of first collisions, of which E is made: sigma_ms / cos theta_t (and sigma_ma's, corrected)
+    T kept;        ///< share of E that the medulla does not absorb, 1 where T_b or the tables have it
     T cortex[std::size_t(Channels)];  ///< sigma_ca / cos theta_t
     T T_b[std::size_t(Channels)];  ///< exp(-(kappa sigma_ma + (1 - kappa) sigma_ca) / cos theta_t), or without sigma_ma
 };
@@ -152,7 +153,7 @@ MEDULLA_FN Absorption<Channels, T> absorption(const FurParameters<Channels, S>& 
     Absorption<Channels, T> a;
     const T medulla = tabled ? T(S(0)) : T(p.kappa * p.sigma_ma) * inverse_cos_t;
     a.medulla_extinction = T(p.sigma_ma + p.sigma_ms) * inverse_cos_t;
-    a.medulla_scattering = T(p.sigma_ms) * inverse_cos_t;
+    a.collisions = T(p.sigma_ms) * inverse_cos_t, a.kept = T(S(1));
     for (int c = 0; c < Channels; ++c) {
         a.cortex[c] = T(p.sigma_ca[c]) * inverse_cos_t;
         a.T_b[c] = -(medulla + T(S(1) - p.kappa) * a.cortex[c]);
@@ -178,7 +179,7 @@ MEDULLA_HOT Energies<Channels, T> energies(const Path<T>& path, const Absorption
                                            T survival = T(S(1))) noexcept {
     Energies<Channels, T> e;
     const T one = T(S(1)), zero = T(S(0));
-    const T F = path.cuticle.F, passed = path.cuticle.T_, depth = path.s_m * T(S(2) * a.medulla_scattering);
+    const T F = path.cuticle.F, passed = path.cuticle.T_, depth = path.s_m * T(S(2) * a.collisions);
     T left[std::size_t(Channels) + 2];  // after half-lengths of cortex, of medulla, and a chord's scattering alone
     for (int c = 0; c < Channels; ++c) left[c] = -path.s_c * T(a.cortex[c]);
     left[std::size_t(Channels)] = -path.s_m * T(a.medulla_extinction), left[std::size_t(Channels) + 1] = -depth;
@@ -186,7 +187,7 @@ MEDULLA_HOT Energies<Channels, T> energies(const Path<T>& path, const Absorption
     for (int c = 0; c < Channels; ++c) crossing[c] = T(S(-2)) * (left[c] + left[std::size_t(Channels)]);
     exponentials(left);
     const T m = left[std::size_t(Channels)],
-            E = scattered ? absorbed(depth, left[std::size_t(Channels) + 1]) * survival : zero;
+            E = scattered ? absorbed(depth, left[std::size_t(Channels) + 1]) * survival * T(a.kept) : zero;
     const T third = passed * F * F;
     for (int c = 0; c < Channels; ++c) {
         const T q = left[c], through = (q * m) * (q * m);

@@ -38,7 +38,9 @@ struct SigmaStep {
 struct TablesPlan {
     TablesStatus status = TablesStatus::ok;
     DenseTables layout = {};
-    AxisPlan axis[6];  ///< sigma, g, h, theta_i, phi, theta_r
+    AxisPlan axis[6];    ///< sigma, g, h, theta_i, phi, theta_r
+    AxisPlan pack_exit;  ///< theta_r as the pack has it
+    bool corrected = false;
     std::uint32_t stretches[6] = {};
     TableView azimuthal, side[2], survival;
     float g[most_range_rows] = {}, sigma[most_range_rows] = {};  ///< nodes
@@ -115,6 +117,9 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     if (absorbs(pack)) plan.survival = pack[TableKind::survival];
     if (plan.survival && !same_axis(plan.azimuthal, plan.survival, Quantity::h)) return fail(TablesStatus::bad_axes);
 
+    if (asked.forms != form_bit(Scattering::published) && asked.forms != form_bit(Scattering::corrected))
+        return fail(TablesStatus::two_forms);
+
     DenseTables& t = plan.layout;
     t.magic = tables_magic;
     t.absorbs = plan.survival ? 1u : 0u;
@@ -140,8 +145,15 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     plan_axis(axis_of(plan.side[0], Quantity::theta_i), plan.axis[3]);
     plan_axis(axis_of(plan.azimuthal, Quantity::phi), plan.axis[4]);
     plan_axis(axis_of(plan.side[0], Quantity::theta_r), plan.axis[5]);
+    plan.corrected = asked.forms == form_bit(Scattering::corrected);
+    plan.pack_exit = plan.axis[5];
+    if (plan.corrected) {
+        if (plan.axis[3].spans + 3 > most_solved_rows || plan.axis[5].spans + 3 > most_solved_rows)
+            return fail(TablesStatus::bad_axes);
+        clamp_ends(plan.axis[3]), clamp_ends(plan.axis[5]);
+    }
     t.one_material = of_one_material(asked) && plan.axis[3].spans + 3 <= most_solved_rows ? 1u : 0u;
-    if (t.one_material) clamp_ends(plan.axis[3]);
+    if (t.one_material && !plan.corrected) clamp_ends(plan.axis[3]);
     // Lookups take the sides of h and theta_i by their signs; beyond its upper end an axis clamps.
     if (!(detail::math::abs(plan.axis[2].lower()) < 1e-6) || !(detail::math::abs(plan.axis[3].lower()) < 1e-6))
         return fail(TablesStatus::bad_axes);
@@ -256,6 +268,49 @@ MEDULLA_FN void expand_rows(const TableView& view, const float* weight, float* t
     }
 }
 
+/// Lobes at the nodes of theta_i. @param weight contracted at sigma and g  @param row_step from node to node [floats]
+MEDULLA_FN void expand_inclinations(const TablesPlan& plan, std::uint32_t side, const float* weight, float* to,
+                                    std::size_t step, std::size_t row_step) noexcept {
+    const TableView& view = plan.side[side];
+    alignas(32) float at[max_rank];
+    for (std::uint32_t i = 0; i < plan.axis[3].spans + 3; ++i) {
+        const float theta = from_spline_coordinate(Quantity::theta_i, float(node_of(plan.axis[3], i)));
+        contract_axis(view, find_axis(view, Quantity::theta_i), theta, weight, at);
+        expand_row(view, at, to + i * row_step, step);
+    }
+}
+
+/// The corrected form: rows of C^M times cos theta_r, by a spline through the product at as many nodes as it has rows.
+struct CosineProduct {
+    SplineSolve solve;
+    std::uint32_t span[most_solved_rows];
+    double weight[most_solved_rows][4];  ///< of the pack's rows at a node, times the cosine
+
+    /// @param from the axis of theta_r as the pack has it  @param to the tables'
+    MEDULLA_APART CosineProduct(const AxisPlan& from, const AxisPlan& to) noexcept : solve(to) {
+        for (std::uint32_t i = 0; i < solve.rows; ++i) {
+            const double theta_r = node_of(to, i);
+            span[i] = 0;
+            while (span[i] + 1 < from.spans && theta_r >= from.knot(std::int32_t(span[i]) + 1)) ++span[i];
+            from.weights(span[i], theta_r, weight[i]);
+            for (double& w : weight[i]) w *= detail::math::cos(theta_r);
+        }
+    }
+    /// @param row coefficients of theta_r >= 0 and of theta_r < 0, `step` floats apart
+    MEDULLA_APART void apply(float* row, std::size_t step) const noexcept {
+        float value[most_solved_rows];
+        for (int side = 0; side < 2; ++side, row += step * solve.rows) {
+            for (std::uint32_t i = 0; i < solve.rows; ++i) {
+                double sum = 0;
+                for (std::uint32_t k = 0; k < 4; ++k) sum += weight[i][k] * double(row[step * (span[i] + k)]);
+                value[i] = float(sum);
+            }
+            for (std::uint32_t i = 0; i < solve.rows; ++i) row[step * i] = value[i];
+            solve.apply(row, step);
+        }
+    }
+};
+
 /// Divides a row by the integral of its positive part and writes its cumulated integrals. A signed low-rank sum with no
 /// positive integral is no density: it becomes even.
 MEDULLA_APART void finish_row(const SplineAxis& axis, float* row, std::uint32_t stride, float* blocks) noexcept {
@@ -294,8 +349,12 @@ MEDULLA_FN void fill_tables(const TablesPlan& plan, DenseTables& t) noexcept {
             expand_rows(plan.azimuthal, weight, azimuthal + j * g_azimuthal + i, sigmas, h_step);
             for (std::uint32_t side = 0; side < 2 && !t.one_material; ++side) {
                 contract_node(plan.side[side], plan.sigma[i], plan.g[j], 0, weight);
-                expand_rows(plan.side[side], weight, longitudinal + j * g_longitudinal + side * sigmas + i,
-                            std::size_t(2) * sigmas, plane);
+                if (plan.corrected)
+                    expand_inclinations(plan, side, weight, longitudinal + j * g_longitudinal + side * sigmas + i,
+                                        std::size_t(2) * sigmas, plane);
+                else
+                    expand_rows(plan.side[side], weight, longitudinal + j * g_longitudinal + side * sigmas + i,
+                                std::size_t(2) * sigmas, plane);
             }
             if (!plan.survival) continue;
             contract_node(plan.survival, plan.sigma[i], plan.g[j], t.ranges.absorption, weight);
@@ -315,6 +374,19 @@ MEDULLA_FN void fill_tables(const TablesPlan& plan, DenseTables& t) noexcept {
             contract_axis(view, find_axis(view, Quantity::theta_i), theta, weight, weight);
             expand_row(view, weight, longitudinal + side * t.theta_i.rows + i, t.longitudinal_step());
         }
+    }
+    if (plan.corrected) {
+        // Lobes times the cosine are densities at the nodes, before splines are put through them: their integrals vary.
+        const CosineProduct product(plan.pack_exit, plan.axis[5]);
+        for (std::size_t row = 0; row < t.longitudinal_planes(); ++row)
+            for (std::uint32_t i = 0; i < t.longitudinal_step(); ++i) {
+                product.apply(longitudinal + row * plane + i, t.longitudinal_step());
+                finish_row(t.theta_r, longitudinal + row * plane + i, t.longitudinal_step(),
+                           floats(t.longitudinal_blocks));
+            }
+        const SplineSolve along_theta(plan.axis[3]);
+        for (std::uint32_t j = 0; j < gs && !t.one_material; ++j)
+            solve(along_theta, longitudinal + j * g_longitudinal, plane, plane, 1);
     }
     const SplineSolve along_sigma(plan.axis[0]);
     solve(along_sigma, azimuthal, 1, gs * g_azimuthal / sigmas, sigmas);

@@ -276,19 +276,16 @@ RowMatrix shares_of(const FibreLight& light, const RowMatrix& C) {
     return shares;
 }
 
-double noise_of(const FibreLight& light) {
-    std::vector<double> each;
-    for (const LightCell& cell : light.cells) {
-        double errors = 0, values = 0;
-        for (std::size_t b = 0; b < light.bins(); ++b) {
-            const double e = static_cast<double>(cell.error[b]), v = static_cast<double>(cell.density[b]);
-            errors += e * e, values += v * v;
-        }
-        if (values > 0) each.push_back(std::sqrt(errors / values));
+/// Relative L2 standard error of the lobe of row [cell][absorption].
+double noise_of(const FibreLight& light, std::size_t row) {
+    const std::size_t bins = light.bins(), first = row % light.sigma_ca.size() * bins;
+    const LightCell& cell = light.cells[row / light.sigma_ca.size()];
+    double errors = 0, values = 0;
+    for (std::size_t b = first; b < first + bins; ++b) {
+        const double e = static_cast<double>(cell.error[b]), v = static_cast<double>(cell.density[b]);
+        errors += e * e, values += v * v;
     }
-    if (each.empty()) return 0;
-    std::nth_element(each.begin(), each.begin() + static_cast<std::ptrdiff_t>(each.size() / 2), each.end());
-    return each[each.size() / 2];
+    return values > 0 ? std::sqrt(errors / values) : 1;
 }
 
 BakeResult bake_with(const FibreLight& light, const BakeOptions& options, const RowMatrix& X, int functions,
@@ -298,27 +295,33 @@ BakeResult bake_with(const FibreLight& light, const BakeOptions& options, const 
     for (std::size_t b = 0; b < mirror.size(); ++b)
         mirror[b] = static_cast<Eigen::Index>(b / r.columns * r.columns + (r.columns - 1 - b % r.columns));
     const Eigen::VectorXd norms = X.rowwise().norm();
-    // Every lobe counts alike; absorptions that are between others do not make the functions.
+    // Every lobe counts alike, but for its noise; absorptions that are between others do not make the functions.
     std::vector<Eigen::Index> lit, fitted;
     for (Eigen::Index i = 0; i < X.rows(); ++i)
         if (norms[i] > 0) lit.push_back(i);
     if (lit.empty()) throw Error("{}: expected scattered light, found none", input);
     for (const Eigen::Index i : lit)
         if (i % absorption_nodes % 2 == 0) fitted.push_back(i);
-    const auto rows_of = [&](const std::vector<Eigen::Index>& chosen) {
+    /// @param trust weight of a lobe by its noise
+    const auto rows_of = [&](const std::vector<Eigen::Index>& chosen, auto&& trust) {
         RowMatrix rows(static_cast<Eigen::Index>(chosen.size()), X.cols());
         for (std::size_t i = 0; i < chosen.size(); ++i)
-            rows.row(static_cast<Eigen::Index>(i)) = X.row(chosen[i]) / norms[chosen[i]];
+            rows.row(static_cast<Eigen::Index>(i)) = X.row(chosen[i]) * (trust(chosen[i]) / norms[chosen[i]]);
         return rows;
+    };
+    const auto by_noise = [&](Eigen::Index row) {
+        constexpr double fair = 0.05;
+        const double noise = noise_of(light, static_cast<std::size_t>(row)) / fair;
+        return 1 / (1 + noise * noise);
     };
     tensor::MirroredOptions factor;
     factor.rank = functions, factor.sweeps = options.sweeps, factor.seed = options.seed;
-    const tensor::MirroredResult factors = tensor::mirrored_factors(rows_of(fitted), mirror, factor);
+    const tensor::MirroredResult factors = tensor::mirrored_factors(rows_of(fitted, by_noise), mirror, factor);
     Parts parts;
     const Bins bins(r.rows, r.columns);
     const RowMatrix rounded = round_functions(bins.nodes(factors.B), r, parts);
     const RowMatrix F = tensor::with_mirrored(bins.averages(rounded), mirror);
-    const RowMatrix found = tensor::nonnegative_coefficients(rows_of(lit), F, 500);
+    const RowMatrix found = tensor::nonnegative_coefficients(rows_of(lit, [](Eigen::Index) { return 1.0; }), F, 500);
     RowMatrix C = RowMatrix::Zero(X.rows(), F.rows());
     for (std::size_t i = 0; i < lit.size(); ++i)
         C.row(lit[i]) = found.row(static_cast<Eigen::Index>(i)) * norms[lit[i]];
@@ -327,7 +330,7 @@ BakeResult bake_with(const FibreLight& light, const BakeOptions& options, const 
 
     BakeResult result;
     result.functions = functions, result.sweeps = factors.sweeps, result.fit = factors.error,
-    result.noise = noise_of(light);
+    result.noise = median_noise(light);
     const auto write = [&](const std::string& provenance) {
         return write_baked(light, options, parts, static_cast<std::size_t>(functions), result.errors, provenance);
     };

@@ -16,7 +16,7 @@ struct BakeOptions {
     std::optional<double> max_error;       ///< instead: the fewest whose worst checked error is at most this
     std::optional<std::size_t> max_bytes;  ///< instead: the most within this size
     std::uint64_t seed = 1;
-    int sweeps = 200;
+    int sweeps = 80;
     double turn = 0.7;  ///< BakedHeader::turn
 };
 

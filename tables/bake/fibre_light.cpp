@@ -1,5 +1,6 @@
 #include "tables/bake/fibre_light.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -26,6 +27,8 @@ double rim_of(const FurParameters<3>& p, double theta_i) {
     return static_cast<double>(p.kappa) / at.inverse_index;
 }
 
+/// With a target error.
+constexpr std::uint64_t most_paths_of_a_cell = 50000000;
 constexpr double edge = 0.9995;  // the last offset: at 1 nothing enters
 
 double offset_of_node(const FibreRequest& r, double theta_i, std::size_t j) {
@@ -46,6 +49,14 @@ void check_fibre_request(const FibreRequest& r, const std::string& where) {
     for (const float sigma : p.sigma_ca)
         if (!(sigma <= 6))
             throw Error("{}: /sigma_ca: expected values of at most 6 in a bake, found {:g}", where, sigma);
+    // As material files have them.
+    const auto within = [&](const char* field, float radians, double low, double high) {
+        const double found = static_cast<double>(radians) * 180 / pi;
+        if (!(found >= low && found <= high))
+            throw Error("{}: /{}: expected degrees in [{:g}, {:g}] in a bake, found {:g}", where, field, low, high,
+                        found);
+    };
+    within("alpha", p.alpha, -45, 45), within("beta_m", p.beta_m, 0, 114.5), within("beta_n", p.beta_n, 0, 114.5);
     try {
         sim3d::FibreOptions options;
         options.theta_bins = r.rows, options.phi_bins = r.columns;
@@ -91,10 +102,12 @@ LightCell simulate_cell(const FibreLight& plan, std::size_t i) {
     light.theta_i = cell.theta_i, light.h_low = light.h_high = cell.h;
     sim3d::FibreOptions options;
     options.paths = check ? r.check_paths : r.paths;
+    if (r.target_error > 0 && !check) options.target_error = r.target_error, options.paths = most_paths_of_a_cell;
     options.seed = r.seed, options.cell = i + (check ? std::uint64_t{1} << 32 : 0);
     options.batches = check ? 8 : 4;
     options.theta_bins = r.rows, options.phi_bins = r.columns;
     const sim3d::FibreProfile profile = sim3d::trace_fibre(fibre, light, options);
+    cell.density.clear(), cell.error.clear();
     cell.R = profile.white_energy(sim3d::only(sim3d::Class::R)).value;
     cell.entered = profile.white_energy(sim3d::unscattered & ~sim3d::only(sim3d::Class::R)).value;
     cell.scattered = profile.white_energy(sim3d::scattered).value;
@@ -104,6 +117,21 @@ LightCell simulate_cell(const FibreLight& plan, std::size_t i) {
         cell.error.insert(cell.error.end(), density.error.begin(), density.error.end());
     }
     return cell;
+}
+
+double median_noise(const FibreLight& light) {
+    std::vector<double> each;
+    for (const LightCell& cell : light.cells) {
+        double errors = 0, values = 0;
+        for (std::size_t b = 0; b < light.bins(); ++b) {
+            const double e = static_cast<double>(cell.error[b]), v = static_cast<double>(cell.density[b]);
+            errors += e * e, values += v * v;
+        }
+        if (values > 0) each.push_back(std::sqrt(errors / values));
+    }
+    if (each.empty()) return 0;
+    std::sort(each.begin(), each.end());
+    return each[each.size() / 2];
 }
 
 double light_bytes(const FibreRequest& r) {

@@ -13,7 +13,8 @@ namespace medulla::tables {
 /// What is simulated of a material. Equal requests give equal light, for any number of threads.
 struct FibreRequest {
     Material material;
-    std::uint64_t paths = 200000;  ///< of each node of (theta_i, |h|)
+    std::uint64_t paths = 400000;  ///< of each node of (theta_i, |h|)
+    double target_error = 0;       ///< instead, if above 0: until a lobe has this relative L2 standard error
     std::uint64_t seed = 1;
     std::size_t inclinations = 13, offsets_inside = 13, offsets_beyond = 4;  ///< nodes; see BakedHeader
     std::size_t rows = 30, columns = 48;                                     ///< bins of theta_r and phi
@@ -54,6 +55,9 @@ inline constexpr float middle_of_absorption = 3.295f;
 
 /// The greatest theta_i of a node [radians].
 inline constexpr double greatest_inclination = 85 * pi / 180;
+
+/// Relative L2 standard error of a lobe at the nodes, without absorption: the median.
+double median_noise(const FibreLight& light);
 
 /// Bytes of memory that the light of a request takes.
 double light_bytes(const FibreRequest& request);

@@ -21,7 +21,8 @@ ROOMS = {
     "tables/store": {"tables/table"},
     "tables/job": {"tables/store", "sim2d/tracer", "sim2d/reference"},
     "tables/pack": {"tables/store", "tensor"},
-    "tables/programs": {"tables/job", "tables/pack", "plot", "sim3d/model"},
+    "tables/bake": {"tables/job", "tensor", "sim3d/model"},
+    "tables/programs": {"tables/bake", "tables/job", "tables/pack", "plot", "sim3d/model"},
 }
 
 

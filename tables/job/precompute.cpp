@@ -1,64 +1,19 @@
 #include "tables/job/precompute.hpp"
 
 #include <omp.h>
-#include <signal.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <mutex>
 
 #include "tables/error.hpp"
 #include "tables/job/budget.hpp"
+#include "tables/job/interrupts.hpp"
 #include "tables/parallel.hpp"
 #include "tables/store/file.hpp"
 #include "tables/store/job_difference.hpp"
-#include "tables/streams.hpp"
 
 namespace medulla::tables {
 namespace {
-
-std::atomic<bool> stop{false};
-std::atomic<int> caught{0};
-static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
-
-constexpr unsigned seconds_of_grace = 5;
-
-/// Ends the process from a signal handler, with a message. Slice files are complete or absent, so nothing is left half
-/// written.
-[[noreturn]] void give_up() {
-    constexpr char text[] = "medulla-precompute: interrupted: unfinished slices discarded; continue with --resume\n";
-    message(STDERR_FILENO, text, sizeof text - 1);
-    ::_exit(128 + caught);
-}
-
-/// Catches SIGINT and SIGTERM in its lifetime. The first allows running slices a few seconds to end, the second none.
-class Interrupts {
-  public:
-    Interrupts() {
-        stop = false, caught = 0;
-        struct sigaction action = {};
-        action.sa_handler = [](int number) {
-            if (number == SIGALRM || caught.exchange(number) != 0) give_up();
-            stop = true;
-            ::alarm(seconds_of_grace);
-        };
-        action.sa_flags = SA_RESTART;
-        ::sigaction(SIGINT, &action, &old_[0]);
-        ::sigaction(SIGTERM, &action, &old_[1]);
-        ::sigaction(SIGALRM, &action, &old_[2]);
-    }
-    ~Interrupts() {
-        ::alarm(0);
-        ::sigaction(SIGALRM, &old_[2], nullptr);
-        ::sigaction(SIGINT, &old_[0], nullptr);
-        ::sigaction(SIGTERM, &old_[1], nullptr);
-    }
-    Interrupts(const Interrupts&) = delete;
-    Interrupts& operator=(const Interrupts&) = delete;
-
-  private:
-    struct sigaction old_[3];
-};
 
 /// The output, if it is already that of this job. Throws Error if it is of another job.
 std::optional<Tables> finished(const Job& job, const Tables& plan) {
@@ -100,7 +55,7 @@ void solve(const Job& job, const SliceSolver& solver, const SliceFolder& folder,
     {
         Progress progress(job.progress, "precompute", cells, done);
         std::mutex mutex;
-        in_parallel(missing.size(), job.request.threads, stop, [&](std::size_t i) {
+        in_parallel(missing.size(), job.request.threads, stop_requested(), [&](std::size_t i) {
             const double began = omp_get_wtime();
             const Slice slice = budget > 0 ? solver.solve(missing[i], refinements[0]) : solver.solve(missing[i]);
             folder.write(missing[i], slice);
@@ -110,8 +65,8 @@ void solve(const Job& job, const SliceSolver& solver, const SliceFolder& folder,
             coarse.push_back({missing[i], slice.standard_error, omp_get_wtime() - began});
         });
     }
-    if (budget == 0 || stop) return;
-    refine(solver, std::move(coarse), budget - (omp_get_wtime() - start), job.request.threads, stop,
+    if (budget == 0 || stop_requested()) return;
+    refine(solver, std::move(coarse), budget - (omp_get_wtime() - start), job.request.threads, stop_requested(),
            [&](const SliceId& id, const Slice& slice) { folder.write(id, slice); });
 }
 
@@ -122,8 +77,8 @@ std::size_t count_kept(const SliceFolder& folder, const std::vector<SliceId>& sl
 }
 
 void throw_if_interrupted(const SliceFolder& folder, const std::vector<SliceId>& slices) {
-    if (stop)
-        throw Interrupted(caught, "interrupted: {} of {} slices kept in {}; continue with --resume",
+    if (stop_requested())
+        throw Interrupted(caught_signal(), "interrupted: {} of {} slices kept in {}; continue with --resume",
                           count_kept(folder, slices), slices.size(), folder.path());
 }
 

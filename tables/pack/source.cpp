@@ -5,12 +5,14 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <iterator>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <tuple>
 
+#include "medulla/baked.hpp"
 #include "medulla/default_pack.hpp"
 #include "medulla/lookup.hpp"
 #include "tables/error.hpp"
@@ -376,9 +378,14 @@ std::vector<unsigned char> read_pack(const std::string& path, bool or_tables) {
     }
     std::vector<unsigned char> bytes = read_file(path, greatest_pack);
     const OpenResult opened = open_pack(bytes.data(), bytes.size());
+    const bool is_baked_magic =
+        bytes.size() >= sizeof baked_magic && std::memcmp(bytes.data(), baked_magic, sizeof baked_magic) == 0;
     if (opened.status != PackStatus::ok)
         throw Error("{}: expected a {}pack of version {}: {}", path, or_tables ? "tables file (HDF5) or a " : "",
-                    pack_version, !or_tables && is_hdf5(path) ? "found a tables file (HDF5)" : describe(opened.status));
+                    pack_version,
+                    !or_tables && is_hdf5(path) ? "found a tables file (HDF5)"
+                    : is_baked_magic            ? "found a baked material, which has no tables"
+                                                : describe(opened.status));
     return bytes;
 }
 

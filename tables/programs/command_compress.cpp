@@ -3,7 +3,9 @@
 
 #include <algorithm>
 
+#include "tables/bake/fibre_file.hpp"
 #include "tables/pack/compress.hpp"
+#include "tables/programs/bake.hpp"
 #include "tables/programs/commands.hpp"
 #include "tables/programs/number.hpp"
 #include "tables/store/json_text.hpp"
@@ -25,6 +27,7 @@ struct CompressArguments {
     std::uint64_t seed = 1;
     bool nonnegative = false, json = false;
     std::optional<int> sweeps;
+    const CLI::Option* solver_given = nullptr;
 };
 
 const char* mirror_name(Mirror mirror) {
@@ -92,6 +95,12 @@ void run_compress(const CompressArguments& args) {
     const std::string stem = named ? first.substr(0, first.size() - 3) : first;
     const Output output(args.output.empty() ? stem + ".furpack" : args.output, args.files);
     if (!args.json) print_messages();
+    if (args.files.size() == 1 && is_fibre_file(first)) {
+        if (args.solver_given->count() > 0 || args.nonnegative)
+            throw UsageError("{}: expected neither --solver nor --nonnegative for the light of a fibre",
+                             args.nonnegative ? "--nonnegative" : "--solver");
+        return run_bake({first, args.rank, args.max_error, args.max_bytes, args.seed, args.sweeps, args.json}, output);
+    }
     CompressOptions options;
     if (args.rank) options.rank = *args.rank;
     options.seed = args.seed;
@@ -228,22 +237,28 @@ void add_compress(CLI::App& app, Action& action) {
     add_command<CompressArguments>(
         app, action, "compress", "tables.h5 -> low-rank pack",
         [](CLI::App& command, CompressArguments& args) {
-            command.add_option("FILE", args.files, "tables file, or two with one table each")
+            command
+                .add_option("FILE", args.files,
+                            "tables file, or two with one table each; or the light of a fibre (medulla-precompute "
+                            "--fibre), to bake it")
                 ->required()
                 ->expected(1, 2);
             command.add_option("-o,--output", args.output, "pack to write (default: FILE with .furpack)");
             auto* size = command.add_option_group("size")->require_option(0, 1);
             add_number(*size, "--rank", args.rank,
                        "components of each part: lobes have a mirror-even and an odd one (default 16). A pack "
-                       "stores them padded with zeros to a multiple of 8, so that 4 take the bytes of 8",
+                       "stores them padded with zeros to a multiple of 8, so that 4 take the bytes of 8. Of a fibre: "
+                       "exit functions, a multiple of 4 up to 24",
                        {1, static_cast<int>(max_rank / 2)});
             add_number(*size, "--max-error", args.max_error,
-                       "smallest pack that keeps this relative L2, rounding included", above_zero);
+                       "smallest pack that keeps this relative L2, rounding included; of a fibre: of the worst lobe",
+                       above_zero);
             add_number(*size, "--max-bytes", args.max_bytes, "least error within this many bytes",
                        {1, std::numeric_limits<std::size_t>::max()});
-            command.add_option("--solver", args.solver, "alternating least squares or Levenberg-Marquardt")
-                ->check(CLI::IsMember({"als", "lm"}))
-                ->capture_default_str();
+            args.solver_given =
+                command.add_option("--solver", args.solver, "alternating least squares or Levenberg-Marquardt")
+                    ->check(CLI::IsMember({"als", "lm"}))
+                    ->capture_default_str();
             command
                 .add_flag("--nonnegative", args.nonnegative,
                           "factors >= 0: each component is a density; by coordinate descent")

@@ -5,6 +5,9 @@
 #include <cmath>
 
 #include "medulla/lookup.hpp"
+#include "tables/bake/baked_file.hpp"
+#include "tables/bake/fibre_file.hpp"
+#include "tables/programs/bake.hpp"
 #include "tables/programs/commands.hpp"
 #include "tables/programs/number.hpp"
 #include "tables/store/json_text.hpp"
@@ -31,6 +34,8 @@ nlohmann::ordered_json axis_json(const Axis& axis) {
 }
 
 nlohmann::ordered_json info(const std::string& path) {
+    if (is_baked(path)) return baked_info(path);
+    if (is_fibre_file(path)) return fibre_info(path);
     nlohmann::ordered_json json = {{"file", json_name(path)}};
     if (is_tables(path)) {
         const Tables tables = read_tables(path);
@@ -101,6 +106,17 @@ void run_info(const InfoArguments& args) {
         const nlohmann::ordered_json json = info(file);
         if (args.json) {
             print("{}\n", json_line(json));
+            continue;
+        }
+        if (json["kind"] == "baked material") {
+            print("{}: baked material of version {}, {} bytes\n", file, baked_version,
+                  json["bytes"].get<std::size_t>());
+            print_baked_info(json);
+            continue;
+        }
+        if (json["kind"] == "light of a fibre") {
+            print("{}: light of a fibre, written by {}\n", file, one_line(json["program"].get<std::string>()));
+            print_fibre_info(json);
             continue;
         }
         const bool tables = json["kind"] == "tables";
@@ -247,6 +263,7 @@ struct Verified {
     std::optional<std::size_t> cells;
     std::optional<double> energy_error, undershoot;
     PackDegeneracy degeneracy;
+    bool of_fibre = false;  ///< its light, or baked
 };
 
 /// Checks every node of a pack: finite, >= 0, integral 1; shares of energy in [0, 1]; and a negative undershoot of at
@@ -279,6 +296,16 @@ void verify_pack(const PackView& pack, const Source& source, const std::string& 
 /// Throws Error with the defect.
 Verified verify(const std::string& file, std::optional<double> max_undershoot) {
     Verified found;
+    if (is_baked(file)) {
+        read_baked(file);
+        found.of_fibre = true;
+        return found;
+    }
+    if (is_fibre_file(file)) {
+        found.cells = read_fibre(file).cells.size();
+        found.of_fibre = true;
+        return found;
+    }
     if (is_tables(file)) {
         const Tables tables = read_tables(file);
         found.cells = 0;
@@ -322,9 +349,13 @@ void run_verify(const VerifyArguments& args) {
             {"undershoot", or_null(found.undershoot)},
             {"degeneracy", degeneracy}};
         if (args.json || error) continue;
-        if (found.cells)
+        if (found.cells && found.of_fibre)
+            print("{}: ok: SHA-256, {} finite and >= 0\n", file, counted(*found.cells, "cell"));
+        else if (found.cells)
             print("{}: ok: SHA-256, {} finite and >= 0, with correct integrals, energies and symmetry\n", file,
                   counted(*found.cells, "cell"));
+        else if (found.of_fibre)
+            print("{}: ok: checksum, structure, functions >= 0 of integral 1\n", file);
         else
             print(
                 "{}: ok: checksum, structure, lobes >= 0 of integral 1 within {:.1e}; negative undershoot at most "

@@ -6,11 +6,11 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
-#include <filesystem>
 #include <vector>
 
 #include "tables/error.hpp"
 #include "tables/job/simulate.hpp"
+#include "tables/programs/bake.hpp"
 #include "tables/programs/program.hpp"
 #include "tables/store/json_text.hpp"
 #include "tables/store/output.hpp"
@@ -21,14 +21,9 @@ namespace {
 
 constexpr double degrees = 180 / pi;
 
-/// A preset by its name, else a material file. Throws Error for a material outside the limits of the simulation.
-Material fibre_named(const std::string& fibre, bool is_preset) {
-    if (!is_preset && !std::filesystem::exists(fibre)) {
-        std::string names;
-        for (const FurPreset& preset : fur_presets) names += std::string(names.empty() ? "" : ", ") + preset.name;
-        throw Error("--fibre: expected a material file or one of {}; found '{}'", names, fibre);
-    }
-    Material material = is_preset ? preset_material(fibre, "--fibre") : read_material(fibre);
+/// Throws Error for a material outside the limits of the simulation.
+Material mapped_material(const std::string& fibre, bool& is_preset) {
+    Material material = fibre_named(fibre, is_preset);
     const FurParameters<3>& p = material.fur;
     const auto within = [&](const char* field, double found, double low, double high) {
         if (!(found > low && found < high))
@@ -76,8 +71,8 @@ class EndedBySignals {
 }  // namespace
 
 void run_error_map(const ErrorMapArguments& args) {
-    const bool is_preset = find_preset(args.fibre.c_str()) != nullptr;
-    ErrorMapTitle title{fibre_named(args.fibre, is_preset), args.paths, args.seed};
+    bool is_preset = false;
+    ErrorMapTitle title{mapped_material(args.fibre, is_preset), args.paths, args.seed};
     const Output output(args.output, is_preset ? std::vector<std::string>{} : std::vector<std::string>{args.fibre});
     if (args.threads > 0) omp_set_num_threads(args.threads);
     const auto start = std::chrono::steady_clock::now();

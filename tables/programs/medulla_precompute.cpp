@@ -1,5 +1,5 @@
-// medulla-precompute: simulates the tables and writes them to an HDF5 file; or, for one material, compares the model
-// with light in the whole fibre (--error-map).
+// medulla-precompute: simulates the tables and writes them to an HDF5 file; or, for one material (--fibre), light in
+// the whole fibre, to bake it or to compare the model with it (--error-map).
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include "tables/job/precompute.hpp"
 #include "tables/job/scene.hpp"
 #include "tables/job/simulate.hpp"
+#include "tables/programs/bake.hpp"
 #include "tables/programs/error_map.hpp"
 #include "tables/programs/number.hpp"
 #include "tables/programs/program.hpp"
@@ -172,27 +173,46 @@ void print_share(const Job& job, const JobReport& report, double seconds, bool a
           job.output);
 }
 
-/// Whether --error-map replaces the job. Throws UsageError for options of the job beside it.
-bool is_error_map(const CLI::App& app) {
-    const bool fibre = app.count("--fibre") > 0, page = app.count("--error-map") > 0;
-    if (!fibre && !page) return false;
-    if (!page) throw UsageError("--fibre: expected --error-map OUT.html with it, found none");
-    if (!fibre) throw UsageError("--error-map: expected --fibre MATERIAL with it, found none");
-    constexpr const char* common[] = {"--fibre",   "--error-map", "--paths", "--seed",
-                                      "--threads", "--progress",  "--json"};
+/// Throws UsageError for options beside those of a job with --fibre.
+void allow_only(const CLI::App& app, std::initializer_list<const char*> allowed, const char* with) {
     for (const CLI::Option* option : app.get_options()) {
         const std::string name = option->get_name();
-        const auto* end = std::end(common);
-        if (option->count() > 0 && std::find(std::begin(common), end, name) == end)
-            throw UsageError("{}: expected no option of the tables with --error-map, found this one", name);
+        if (option->count() > 0 && std::find(allowed.begin(), allowed.end(), name) == allowed.end())
+            throw UsageError("{}: expected no option of the tables with {}, found this one", name, with);
     }
-    return true;
+}
+
+SimulateFibreArguments fibre_arguments(const CLI::App& app, const Arguments& args) {
+    SimulateFibreArguments fibre;
+    fibre.fibre = args.fibre;
+    if (app.count("--output") > 0) fibre.output = args.output;
+    if (app.count("--paths") > 0) fibre.paths = args.paths;
+    if (app.count("--bins") > 0) {
+        if (args.bins % 8 != 0 || args.bins < 16 || args.bins > 256)
+            throw UsageError("--bins: expected a multiple of 8 in [16, 256] with --fibre, found {}", args.bins);
+        fibre.bins = args.bins;
+    }
+    fibre.target_error = args.target_error, fibre.seed = args.seed, fibre.threads = args.threads;
+    fibre.progress = progress_of(args.progress), fibre.compression = compression_of(args.compression);
+    fibre.resume = args.resume, fibre.json = args.json;
+    return fibre;
 }
 
 void run(const CLI::App& app, const Arguments& args) {
-    if (is_error_map(app))
+    if (app.count("--error-map") > 0) {
+        if (app.count("--fibre") == 0) throw UsageError("--error-map: expected --fibre MATERIAL with it, found none");
+        allow_only(app, {"--fibre", "--error-map", "--paths", "--seed", "--threads", "--progress", "--json"},
+                   "--error-map");
         return run_error_map(
             {args.fibre, args.error_map, args.paths, args.seed, args.threads, progress_of(args.progress), args.json});
+    }
+    if (app.count("--fibre") > 0) {
+        allow_only(app,
+                   {"--fibre", "--output", "--paths", "--target-error", "--bins", "--seed", "--threads", "--resume",
+                    "--compression", "--progress", "--json"},
+                   "--fibre");
+        return run_simulate_fibre(fibre_arguments(app, args));
+    }
     Job job = job_of(args);
     double share = 1;
     if (!args.scene.empty()) {
@@ -258,10 +278,13 @@ void declare(CLI::App& app, Arguments& args) {
                    "paths (default: none; N 8)");
     app.add_option("--scene", args.scene, "scene file (JSON): only the nodes that its materials need");
     app.add_option("--fibre", args.fibre,
-                   "with --error-map: a material file (JSON), or a preset of `furtable presets`");
+                   "in place of tables: simulate light in the whole fibre of one material in three dimensions, for "
+                   "`furtable compress` to bake: a material file (JSON), or a preset of `furtable presets`. --paths "
+                   "(400000) for each of 169 or 221 nodes (theta_i, h); --bins (48) of phi; --output is FIBRE.h5");
     app.add_option(
         "--error-map", args.error_map,
-        "in place of tables: write a page (HTML) of where the five-lobe model of --fibre differs from light in "
+        "with --fibre, in place of its light: write a page (HTML) of where the five-lobe model of --fibre differs from "
+        "light in "
         "the fibre in three dimensions, and by how much; --paths are traced for each of 88 cells (theta_i, h), and as "
         "many again in a smooth fibre");
     app.add_flag("--dry-run", args.dry_run, "print what would be simulated and how long it would take; write nothing");

@@ -11,6 +11,7 @@
 #include "medulla/detail/math.hpp"
 #include "medulla/detail/table_lookup.hpp"
 #include "medulla/fur_parameters.hpp"
+#include "medulla/vector.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {

@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::uint64_t greatest_scene = 1 << 24;
+constexpr std::uint64_t greatest_scene = 1 << 24, greatest_baked = 1 << 26;
 
 Camera read_camera(Fields f) {
     Camera c;
@@ -43,11 +43,48 @@ FurParameters<3> preset(const std::string& name, bool printed, const std::string
     throw Error("{}: expected one of {}, each also with _corrected; found '{}'", place, names, name);
 }
 
+/// The bytes of the file that a field names, beside the scene; its fingerprint goes into scene.text.
+std::string named_file(Fields& f, const char* name, std::uint64_t most, Scene& scene, std::string& path) {
+    const std::string named = f.text(name, "");
+    if (named.empty()) throw Error("{}: expected the name of a file, found none", f.place(name));
+    path = path_beside(f.file(), named);
+    std::string bytes;
+    try {
+        bytes = read_file(path, most);
+    } catch (const Error& error) {
+        throw Error("{}: {}", f.place(name), error.what());
+    }
+    scene.text += fmt::format("\n{:016x}", fingerprint(bytes.data(), bytes.size()));
+    return bytes;
+}
+
+std::shared_ptr<const Baked> read_baked(Fields& f, Scene& scene) {
+    auto baked = std::make_shared<Baked>();
+    std::string path;
+    baked->bytes = named_file(f, "baked", greatest_baked, scene, path);
+    const BakedResult opened = open_baked(baked->bytes.data(), baked->bytes.size());
+    if (opened.status != BakedStatus::ok) throw Error("{}: {}: {}", f.place("baked"), path, describe(opened.status));
+    baked->material = opened.material;
+    return baked;
+}
+
 /// Fields and ranges are those of a material of medulla-precompute's scenes (docs/formats.md).
-Material read_material(Fields f) {
+Material read_material(Fields f, Scene& scene) {
     Material m;
     m.name = f.text("name", "");
     if (m.name.empty()) throw Error("{}: expected a name, found none", f.place("name"));
+    const auto read_sigma_ca = [&] {
+        FurParameters<3>& p = m.fur;
+        const Rgb c = f.colour("sigma_ca", {p.sigma_ca[0], p.sigma_ca[1], p.sigma_ca[2]});
+        p.sigma_ca[0] = c.x, p.sigma_ca[1] = c.y, p.sigma_ca[2] = c.z;
+    };
+    if (f.has("baked")) {  // everything but the colour is fixed
+        m.baked = read_baked(f, scene);
+        m.fur = m.baked->material.parameters();
+        read_sigma_ca();
+        f.done();
+        return m;
+    }
     if (f.has("preset")) {
         const bool printed = f.choice("colour", {"coat", "printed"}, 0) == 1;
         m.fur = preset(f.text("preset", ""), printed, f.place("preset"));
@@ -60,8 +97,7 @@ Material read_material(Fields f) {
     p.layers = f.number("layers", p.layers, {0, 1000});
     p.sigma_ms = f.number("sigma_ms", p.sigma_ms, at_least_0),
     p.sigma_ma = f.number("sigma_ma", p.sigma_ma, at_least_0);
-    const Rgb c = f.colour("sigma_ca", {p.sigma_ca[0], p.sigma_ca[1], p.sigma_ca[2]});
-    p.sigma_ca[0] = c.x, p.sigma_ca[1] = c.y, p.sigma_ca[2] = c.z;
+    read_sigma_ca();
     p.g = f.number("g", p.g, {-0.999, 0.999});
     p.fresnel = static_cast<Fresnel>(f.choice("fresnel", {"bravais", "exact"}, int(p.fresnel)));
     p.scattering = static_cast<Scattering>(f.choice("scattering", {"published", "corrected"}, int(p.scattering)));
@@ -97,21 +133,6 @@ std::vector<Stop> read_along(Fields& f, const std::vector<Material>& materials, 
     }
     if (stops.empty()) throw Error("{}: expected at least one entry", f.place("along"));
     return stops;
-}
-
-/// The bytes of the file that a field names, beside the scene; its fingerprint goes into scene.text.
-std::string named_file(Fields& f, const char* name, std::uint64_t most, Scene& scene, std::string& path) {
-    const std::string named = f.text(name, "");
-    if (named.empty()) throw Error("{}: expected the name of a file, found none", f.place(name));
-    path = path_beside(f.file(), named);
-    std::string bytes;
-    try {
-        bytes = read_file(path, most);
-    } catch (const Error& error) {
-        throw Error("{}: {}", f.place(name), error.what());
-    }
-    scene.text += fmt::format("\n{:016x}", fingerprint(bytes.data(), bytes.size()));
-    return bytes;
 }
 
 std::shared_ptr<const Texture> read_texture(Fields f, Scene& scene) {
@@ -341,7 +362,7 @@ Scene parse_scene(const std::string& text, const std::string& where) {
     };
     scene.camera = read_camera(part("camera"));
     scene.picture = read_picture(part("picture"));
-    each("materials", [&](Fields m) { scene.materials.push_back(read_material(std::move(m))); });
+    each("materials", [&](Fields m) { scene.materials.push_back(read_material(std::move(m), scene)); });
     const json& coats = f.has("coats") ? f.value("coats") : nothing;
     if (!coats.is_object()) throw Error("{}: expected an object, found {}", f.place("coats"), quoted(coats));
     each("objects", [&](Fields o) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "medulla/baked.hpp"
 #include "medulla/fur_parameters.hpp"
 #include "render/environment.hpp"
 #include "render/mesh.hpp"
@@ -28,9 +29,16 @@ struct Picture {
     bool filmic = true;  ///< the PNG's tone curve; otherwise plain sRGB
 };
 
+/// A baked pack with the bytes that its material reads. docs/truth.md, 'Bake'.
+struct Baked {
+    std::string bytes;
+    BakedMaterial material;
+};
+
 struct Material {
     std::string name;
-    FurParameters<3> fur;
+    FurParameters<3> fur;                ///< of a baked one those of its bake, but for sigma_ca
+    std::shared_ptr<const Baked> baked;  ///< null: the five-lobe model
 };
 
 struct Layer {

@@ -8,6 +8,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "medulla/baked_field.hpp"
 #include "medulla/medulla.hpp"
 #include "render/error.hpp"
 #include "render/groom.hpp"
@@ -70,8 +71,10 @@ class Shading {
     Rgb albedo(const FibreHit& hit) const {
         const Basis basis = basis_about(hit.tangent);
         const Vector known = FieldInWorld<int>::local(basis, hit.known);
-        const NearField<3> field =
-            near_field(fibre(hit), known, offset_of(known, FieldInWorld<int>::local(basis, hit.point)));
+        const float h = offset_of(known, FieldInWorld<int>::local(basis, hit.point));
+        if (const BakedMaterial* baked = coats_[hit.layer].baked)
+            return rgb(near_field(make_fibre(*baked, fibre(hit).parameters.sigma_ca), known, h).albedo());
+        const NearField<3> field = near_field(fibre(hit), known, h);
         return rgb(lobes_ == all_lobes ? field.albedo() : field.keep(lobes_).albedo());
     }
 
@@ -90,11 +93,16 @@ class Shading {
         }
         const bool one_offset = choice == FieldChoice::one_offset ||
                                 (choice == FieldChoice::multiscale && hit.footprint < narrow_footprint);
-        if (one_offset) {
+        const Offsets offsets = choice == FieldChoice::multiscale ? pixel_coverage(h, hit.footprint, 1, 1) : Offsets{};
+        if (const BakedMaterial* material = coats_[hit.layer].baked) {
+            const BakedFibre<3> baked = make_fibre(*material, fibre.parameters.sigma_ca);
+            if (one_offset)
+                use(FieldInWorld<BakedNear<3>>{basis, near_field(baked, known, h)});
+            else
+                use(FieldInWorld<BakedFar<3>>{basis, far_field(baked, known, offsets)});
+        } else if (one_offset) {
             with_lobes(basis, near_field(fibre, known, h), use);
         } else {
-            const bool covered = choice == FieldChoice::multiscale;
-            const Offsets offsets = covered ? pixel_coverage(h, hit.footprint, 1, 1) : Offsets{};
             with_lobes(basis, far_field(fibre, known, offsets), use);
         }
         return fibre.status == FibreStatus::clamped_parameters;
@@ -117,6 +125,7 @@ class Shading {
         std::unique_ptr<void, Free> memory;
         const DenseTables* tables = nullptr;
         Fibre<3> first;
+        const BakedMaterial* baked = nullptr;  ///< null: the five-lobe model
     };
 
     template <class Field, class Use>
@@ -125,8 +134,8 @@ class Shading {
     }
 
     /// Tables for the ranges of all parameters that interpolation between the stops and textures can give.
-    static Coat make_coat(const std::vector<Material>& materials, const Strands& layer, const PackView& pack,
-                          FibreModel model) {
+    Coat make_coat(const std::vector<Material>& materials, const Strands& layer, const PackView& pack,
+                   FibreModel model) const {
         const std::vector<Stop>& along = layer.along;
         Coat coat;
         coat.textures = layer.textures;
@@ -140,6 +149,7 @@ class Shading {
             low.eta = std::max(low.eta, p.eta),
             high.eta = std::min(high.eta, p.eta);  // the longest way is of the least
         }
+        coat.baked = baked_of(materials, layer, model);
         for (const auto& texture : coat.textures) {
             float least, most;
             range_of(*texture, least, most);
@@ -164,6 +174,25 @@ class Shading {
         }
         coat.first = make_fibre(coat.stops[0].fur, coat.tables);
         return coat;
+    }
+
+    /// The bake of a coat whose materials have one; null where none has.
+    const BakedMaterial* baked_of(const std::vector<Material>& materials, const Strands& layer,
+                                  FibreModel model) const {
+        const Material& first = materials[std::size_t(layer.along[0].material)];
+        for (const Stop& stop : layer.along) {
+            const Material& material = materials[std::size_t(stop.material)];
+            if (material.baked != first.baked)
+                throw Error("materials {} and {}: expected one baked pack along a strand", first.name, material.name);
+        }
+        if (first.baked == nullptr || !is_fur(model)) return nullptr;
+        if (lobes_ != all_lobes || model != FibreModel::fur)
+            throw Error("material {}: a baked pack has no single lobes: expected neither --lobes nor --model eq12",
+                        first.name);
+        for (const auto& texture : layer.textures)
+            if (texture->sets == Sets::kappa || texture->sets == Sets::sigma_ms_factor)
+                throw Error("material {}: a texture may set nothing but the colour of a baked pack", first.name);
+        return &first.baked->material;
     }
 
     Fibre<3> fibre(const FibreHit& hit) const {

@@ -234,6 +234,15 @@ struct BakedField {
         for (int c = 0; c < Channels; ++c) result[c] = total[c];
         return result;
     }
+    /// Share of the light that leaves, over all directions.
+    MEDULLA_FN Colour<Channels> albedo() const noexcept {
+        Colour<Channels> sum = scattered_energy();
+        for (int i = 0; material != nullptr && i < part_count; ++i) {
+            const Colour<Channels> other = part[i].albedo();
+            for (int c = 0; c < Channels; ++c) sum[c] += scale[i] * other[c];
+        }
+        return sum;
+    }
     /// Energy of scattered light.
     MEDULLA_FN Colour<Channels> scattered_energy() const noexcept {
         Colour<Channels> result;

@@ -2,7 +2,8 @@
 #include <catch2/catch.hpp>
 #include <fstream>
 
-#include "render/error.hpp"
+#include "medulla/default_pack.hpp"
+
 #include "tests/render/scenes.hpp"
 #include "tests/support/small_bake.hpp"
 

@@ -62,9 +62,11 @@ class FurRender(unittest.TestCase):
         self.assertRegex(run("--version", cwd=self.cwd)[1], r"medulla \d+\.\d+\.\d+")
         for words in ([], ["patch.json"], ["patch.json", "-o", "x.jpg"], ["patch.json", "-o", "x.png", "--spp", 0],
                       ["patch.json", "-o", "x.png", "--field", "middle"], ["patch.json", "-o", "x.png", "--error", "-1"],
-                      ["patch.json", "-o", "x.png", "--lobes", "R,TTT"], ["patch.json", "-o", "x.png", "-o", "y.gif"],
+                      ["patch.json", "-o", "x.png", "--lobes", "R,TTT"],
+                      ["patch.json", "-o", "x.png", "--model", "deon", "--lobes", "R"], ["patch.json", "-o", "x.png", "-o", "y.gif"],
                       ["patch.json", "-o", "x.png", "--layers"], ["patch.json", "-o", "x.png", ""], ["patch.json", "-o", "x.png", "--nonsense"]):
             self.fails(2, *words)
+        self.fails(2, "patch.json", "-o", "x.png", "--model", "phong", names=["--model: phong not in", "kajiya-kay", "yan2015"])
         self.fails(1, "absent.json", "-o", "x.png", names=["absent.json", "No such file"])
         self.fails(1, ".", "-o", "x.png", names=[".: "])
         self.fails(1, "patch.json", "-o", "nowhere/x.png", "--spp", 1, *SMALL, names=["nowhere/x.png"])

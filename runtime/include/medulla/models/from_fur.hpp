@@ -32,7 +32,8 @@ MEDULLA_FN float invert_convex(float y, float x, F&& f, Slope&& slope) noexcept 
     return x;
 }
 
-/// Energies of R and of all other lobes for light across the fibre, averaged over its width: 8 midpoints in h.
+/// Energies of R and of all other lobes for light across the fibre, averaged over its width: 16 midpoints in h, 1 % of
+/// it.
 template <int Channels>
 struct CoatEnergies {
     float R[std::size_t(Channels)] = {}, rest[std::size_t(Channels)] = {};
@@ -42,13 +43,13 @@ MEDULLA_FN CoatEnergies<Channels> coat_energies(const FurParameters<Channels>& p
     CoatEnergies<Channels> sum;
     const Inclination<float> at = inclination(p.eta, 1.0f, p.fresnel);
     const Absorption<Channels> a = absorption(p, at.inverse_cos_t);
-    for (int i = 0; i < 8; ++i) {
-        const float h = (float(i) + 0.5f) / 8;
+    for (int i = 0; i < 16; ++i) {
+        const float h = (float(i) + 0.5f) / 16;
         const Path<float> path = trace(at, p.kappa, p.layers, h, math::sqrt((1 - h) * (1 + h)));
         const auto e = energies(path, a, p.sigma_ms > 0 && path.s_m > 0);
         for (int c = 0; c < Channels; ++c) {
-            sum.R[c] += e.A[0][c] / 8;
-            for (int k = 1; k < all_lobe_count; ++k) sum.rest[c] += e.A[k][c] / 8;
+            sum.R[c] += e.A[0][c] / 16;
+            for (int k = 1; k < all_lobe_count; ++k) sum.rest[c] += e.A[k][c] / 16;
         }
     }
     return sum;

@@ -113,8 +113,7 @@ int main(int argc, char** argv) {
         if (smooth) fibre.alpha = fibre.beta_m = fibre.beta_n = 0;
         const FibreProfile truth = trace_fibre(fibre, light, options);
         const OffsetRange range = h ? OffsetRange{*h, *h} : OffsetRange{0, 1};
-        const FiveLobes model =
-            five_lobes(fibre, {}, light.theta_i, {range}, options.theta_bins, options.phi_bins)[0];
+        const FiveLobes model = five_lobes(fibre, {}, light.theta_i, {range}, options.theta_bins, options.phi_bins)[0];
         const double model_energy = model.energy[0][3] + model.energy[0][4];
         const auto shape = [&](Longitudinal which) {
             const DirectionalDensity& d = model.scattered[0][std::size_t(which)];

@@ -35,9 +35,15 @@ struct PathHit {
     Vector known, light;  ///< unit, away from the fibre
     float h;
     float u[5];
+<<<<<<< HEAD
     FurParameters<3> coat, textured_medulla, textured_colour, textured;
     Offsets interval;       ///< a fifth of the fibre about h
     float hair_sigma_a[3];  ///< of the models without a medulla
+=======
+    FurParameters<3> coat, corrected, textured_medulla, textured_colour, textured;
+    Offsets interval;  ///< a fifth of the fibre about h
+    float chiang_sigma_a[3];
+>>>>>>> mends
 };
 
 /// Known directions as rays meet a fibre (in proportion to the width it shows them); h, light and numbers even.
@@ -62,7 +68,8 @@ std::vector<PathHit> random_hits() {
         const float low = std::min(0.8f, std::max(-1.0f, hit.h - 0.1f));
         hit.interval = {low, low + 0.2f};
         hit.coat = parameters_of<3>(*find_preset("bobcat"));
-        hit.textured_medulla = hit.textured_colour = hit.coat;
+        hit.textured_medulla = hit.textured_colour = hit.corrected = hit.coat;
+        hit.corrected.scattering = Scattering::corrected;
         hit.textured_medulla.sigma_ms = between(0.5f, 4), hit.textured_medulla.sigma_ma = between(0, 0.5f);
         hit.textured_medulla.g = between(0, 0.7f), hit.textured_medulla.kappa = between(0.5f, 0.95f);
         for (float& s : hit.textured_colour.sigma_ca) s = between(0, 2);
@@ -141,7 +148,7 @@ double error_of(const std::vector<PathHit>& hits, Value&& value, Exact&& exact) 
 
 /// The paper's five lobes against the reference implementation in double, which reads the pack's factors.
 double near_error(const std::vector<PathHit>& hits, FurParameters<3> PathHit::*parameters, const DenseTables* tables) {
-    const reference::Factors factors(default_pack());
+    const reference::Factors factors(default_pack(), (hits[0].*parameters).scattering);
     return error_of(
         hits,
         [&](const PathHit& hit) {
@@ -203,8 +210,9 @@ int main(int argc, char** argv) {
     const std::vector<PathHit> hits = random_hits();
     TableRanges ranges = ranges_of(hits[0].coat), wide = ranges;
     for (const PathHit& hit : hits) wide = join(wide, ranges_of(hit.textured_medulla));
-    const test::OwnedTables one(default_pack(), ranges), textured(default_pack(), wide);
-    for (const test::OwnedTables* tables : {&one, &textured})
+    const test::OwnedTables one(default_pack(), ranges), textured(default_pack(), wide),
+        corrected(default_pack(), ranges_of(hits[0].corrected));
+    for (const test::OwnedTables* tables : {&one, &textured, &corrected})
         if (tables->status() != TablesStatus::ok) return std::fprintf(stderr, "%s\n", describe(tables->status())), 1;
     const Fibre<3> coat = make_fibre(hits[0].coat, one.get());
     const auto near_row = [&hits](FurParameters<3> PathHit::*parameters, const DenseTables* tables) {
@@ -217,6 +225,9 @@ int main(int argc, char** argv) {
 
     bench::VertexTimes times(hit_count);
     times.add("one coat, near", near_row(&PathHit::coat, one.get()), near_error(hits, &PathHit::coat, one.get()));
+    // The reference takes an integral over theta_r for every hit.
+    times.add("corrected coat, near", near_row(&PathHit::corrected, corrected.get()),
+              near_error({hits.begin(), hits.begin() + 100}, &PathHit::corrected, corrected.get()));
     times.add("textured medulla, near", near_row(&PathHit::textured_medulla, textured.get()),
               near_error(hits, &PathHit::textured_medulla, textured.get()));
     times.add("textured colour, near", near_row(&PathHit::textured_colour, one.get()),

@@ -198,7 +198,6 @@ class ErrorMap(unittest.TestCase):
 
     def test_bad_input(self):
         page = ["--error-map", "never.html"]
-        self.fails(2, "--fibre", "mouse", parts=["--fibre", "--error-map"])
         self.fails(2, *page, parts=["--error-map", "--fibre"])
         for option in (["-o", "t.h5"], ["--table", "both"], ["--sigma-range", "0:4:5"], ["--g-range", "0:0.6:3"],
                        ["--h-range", "0:1:4"], ["--theta-range", "0:60:3"], ["--absorption-range", "0:2:3"],

@@ -120,7 +120,7 @@ TEST_CASE("baked material, mutated bytes are refused or harmless", "[baked]") {
     CHECK(refused > 500);
 }
 
-TEST_CASE("light of a fibre, file and back; damage and other kinds of file", "[baked]") {
+TEST_CASE("light of a fibre, file and back, damage and other kinds of file", "[baked]") {
     const test::TemporaryFolder folder;
     const std::string path = folder / "fox.h5";
     FibreRequest request = test::small_fibre("red_fox");

@@ -340,12 +340,16 @@ std::string answer(const ChannelError& e) {
         if (!d.resolved()) return fmt::format("below {:.3f}, the noise", d.bound());
         return fmt::format("{:.3f}", d.value());
     };
+    // The corrected form has the cosine.
+    const std::string cosine =
+        e.shape.square.value == e.cosine.square.value
+            ? ""
+            : fmt::format(", and of {} once C<sup>M</sup> is multiplied by cos θ<sub>r</sub>", text(e.cosine));
     return fmt::format(
         "Of the light that meets the fibre, {:.3f} leaves scattered by the medulla; in the model {:.3f}, {}. The shape "
-        "of the scattered lobe has a relative L2 error of {}, and of {} once C<sup>M</sup> is multiplied by cos "
-        "θ<sub>r</sub>. R is {:.3f}; in the model {:.3f}, {}.",
-        e.scattered.value, e.model_scattered(), percent(e.model_scattered(), e.scattered), text(e.shape),
-        text(e.cosine), e.truth[0].value, e.model[0], percent(e.model[0], e.truth[0]));
+        "of the scattered lobe has a relative L2 error of {}{}. R is {:.3f}; in the model {:.3f}, {}.",
+        e.scattered.value, e.model_scattered(), percent(e.model_scattered(), e.scattered), text(e.shape), cosine,
+        e.truth[0].value, e.model[0], percent(e.model[0], e.truth[0]));
 }
 
 std::string work(const ErrorMapTitle& title, const sim3d::ErrorMap& map) {

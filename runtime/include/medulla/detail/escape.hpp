@@ -79,8 +79,8 @@ MEDULLA_HOT void set_corrected(const FurParameters<Channels>& p, const float (&s
 
     // A crossing of the medulla: 1 - u collides; of the directions in which scattered light leaves, 1 - exp(-sigma_ms
     // L) weights each as reciprocity has it.
-    const Four far = one / cos_theta, chord = (half + half) * far;
-    const Four cortex = Four((1 - p.kappa) * (1 + p.kappa)) / (cos_b + half) * far;
+    const Four slant = one / cos_theta, chord = (half + half) * slant;
+    const Four cortex = Four((1 - p.kappa) * (1 + p.kappa)) / (cos_b + half) * slant;
     const Four scattering = Four(p.sigma_ms) * chord, depth = Four(p.sigma_ms + p.sigma_ma) * chord;
     const Four collides = absorbed(depth, exponential(-depth));
     weight = weight * absorbed(scattering, exponential(-scattering));

@@ -11,6 +11,7 @@
 #include "medulla/detail/clamped_integral.hpp"
 #include "medulla/detail/math.hpp"
 #include "medulla/detail/row_integral.hpp"
+#include "medulla/detail/spline_solve.hpp"
 #include "medulla/lookup.hpp"
 #include "medulla/tables.hpp"
 
@@ -18,9 +19,8 @@ namespace medulla {
 inline namespace MEDULLA_TARGET {
 namespace detail {
 
-/// Rows of a made-to-measure axis at most, and of theta_i where sigma follows from it: the system that is solved for
-/// them stands on the stack.
-inline constexpr std::uint32_t most_range_rows = 40, most_solved_rows = 128;
+/// Rows of a made-to-measure axis at most: its nodes stand on the stack.
+inline constexpr std::uint32_t most_range_rows = 40;
 
 /// The axis of g: lobes are analytic in g up to |g| = 1, and steps are a share of the distance to it. Steps of both
 /// axes are such that lobes differ from the factors' by a relative L2 of 3e-4 at most over a coat's ranges, and of 6e-4
@@ -60,12 +60,6 @@ MEDULLA_FN bool of_one_material(const TableRanges& r) noexcept {
         double(r.sigma_low) * double(r.eta) / detail::math::sqrt((double(r.eta) - 1) * (double(r.eta) + 1));
     return detail::math::abs(double(r.sigma_high) - high) <= 1e-5 * high;
 }
-/// Knots beyond either end of an axis repeat it: the splines are the same, and the nodes of all rows lie within.
-MEDULLA_FN void clamp_ends(AxisPlan& plan) noexcept {
-    plan.t[0] = plan.t[1] = plan.lower();
-    plan.t[plan.spans + 3] = plan.t[plan.spans + 4] = plan.upper();
-}
-
 /// Parameter axis of a table by what it measures; its axis_count if there is none.
 MEDULLA_FN std::uint32_t find_axis(const TableView& view, Quantity quantity) noexcept {
     std::uint32_t k = 0;
@@ -84,12 +78,6 @@ MEDULLA_FN bool same_axis(const TableView& a, const TableView& b, Quantity quant
     for (std::size_t i = 0; i < bytes; ++i)  // no memcmp on a GPU
         if (x.knots[i] != y.knots[i]) return false;
     return true;
-}
-
-/// Nodes of a spline through as many values as it has rows: the means of three neighbouring knots (Greville).
-MEDULLA_FN double node_of(const AxisPlan& plan, std::uint32_t row) noexcept {
-    const auto i = std::int32_t(row);
-    return (plan.knot(i - 2) + plan.knot(i - 1) + plan.knot(i)) / 3;
 }
 
 /// Range [low, high] within the axis that both tables share; false where they do not meet it.
@@ -197,47 +185,6 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     t.bytes = at + 16 * t.longitudinal_step();  // draws read four rows past the last
 }
 
-/// A spline through values at its nodes: coefficients from values. The matrix of weights is banded and totally
-/// positive, as each node lies where its row weighs most, and such a system is eliminated without pivots (de Boor 1978,
-/// XIII).
-struct SplineSolve {
-    static constexpr int band = 3;  ///< diagonals to either side
-    std::uint32_t rows;
-    double factor[most_solved_rows][2 * band + 1] =
-        {};  ///< of row i at column i - band + k: L below, U from k = band on
-
-    MEDULLA_APART explicit SplineSolve(const AxisPlan& plan) noexcept : rows(plan.spans + 3) {
-        for (std::uint32_t i = 0; i < rows; ++i) {
-            const double x = node_of(plan, i);
-            std::uint32_t span = 0;
-            while (span + 1 < plan.spans && x >= plan.knot(std::int32_t(span) + 1)) ++span;
-            double w[4];
-            plan.weights(span, x, w);
-            for (std::uint32_t k = 0; k < 4; ++k) factor[i][span + k + band - i] = w[k];
-        }
-        for (std::uint32_t c = 0; c < rows; ++c)
-            for (std::uint32_t i = c + 1; i < rows && i <= c + band; ++i) {
-                double& below = factor[i][c + band - i];
-                below /= factor[c][band];
-                for (std::uint32_t k = c + 1; k < rows && k <= c + band; ++k)
-                    factor[i][k + band - i] -= below * factor[c][k + band - c];
-            }
-    }
-    /// Values at the nodes, `step` floats apart, become coefficients.
-    MEDULLA_APART void apply(float* x, std::size_t step) const noexcept {
-        double y[most_solved_rows];
-        for (std::uint32_t i = 0; i < rows; ++i) {
-            y[i] = double(x[i * step]);
-            for (std::uint32_t k = i > band ? i - band : 0; k < i; ++k) y[i] -= factor[i][k + band - i] * y[k];
-        }
-        for (std::uint32_t i = rows; i-- > 0;) {
-            for (std::uint32_t k = i + 1; k < rows && k <= i + band; ++k) y[i] -= factor[i][k + band - i] * y[k];
-            y[i] /= factor[i][band];
-            x[i * step] = float(y[i]);
-        }
-    }
-};
-
 /// The factors of a table contracted at (sigma, g), and at an absorption that goes with sigma.
 MEDULLA_APART void contract_node(const TableView& view, float sigma, float g, float absorption,
                                  float* weight) noexcept {
@@ -279,37 +226,6 @@ MEDULLA_FN void expand_inclinations(const TablesPlan& plan, std::uint32_t side, 
         expand_row(view, at, to + i * row_step, step);
     }
 }
-
-/// The corrected form: rows of C^M times cos theta_r, by a spline through the product at as many nodes as it has rows.
-struct CosineProduct {
-    SplineSolve solve;
-    std::uint32_t span[most_solved_rows];
-    double weight[most_solved_rows][4];  ///< of the pack's rows at a node, times the cosine
-
-    /// @param from the axis of theta_r as the pack has it  @param to the tables'
-    MEDULLA_APART CosineProduct(const AxisPlan& from, const AxisPlan& to) noexcept : solve(to) {
-        for (std::uint32_t i = 0; i < solve.rows; ++i) {
-            const double theta_r = node_of(to, i);
-            span[i] = 0;
-            while (span[i] + 1 < from.spans && theta_r >= from.knot(std::int32_t(span[i]) + 1)) ++span[i];
-            from.weights(span[i], theta_r, weight[i]);
-            for (double& w : weight[i]) w *= detail::math::cos(theta_r);
-        }
-    }
-    /// @param row coefficients of theta_r >= 0 and of theta_r < 0, `step` floats apart
-    MEDULLA_APART void apply(float* row, std::size_t step) const noexcept {
-        float value[most_solved_rows];
-        for (int side = 0; side < 2; ++side, row += step * solve.rows) {
-            for (std::uint32_t i = 0; i < solve.rows; ++i) {
-                double sum = 0;
-                for (std::uint32_t k = 0; k < 4; ++k) sum += weight[i][k] * double(row[step * (span[i] + k)]);
-                value[i] = float(sum);
-            }
-            for (std::uint32_t i = 0; i < solve.rows; ++i) row[step * i] = value[i];
-            solve.apply(row, step);
-        }
-    }
-};
 
 /// Divides a row by the integral of its positive part and writes its cumulated integrals. A signed low-rank sum with no
 /// positive integral is no density: it becomes even.

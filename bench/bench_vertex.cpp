@@ -35,15 +35,9 @@ struct PathHit {
     Vector known, light;  ///< unit, away from the fibre
     float h;
     float u[5];
-<<<<<<< HEAD
-    FurParameters<3> coat, textured_medulla, textured_colour, textured;
+    FurParameters<3> coat, corrected, textured_medulla, textured_colour, textured;
     Offsets interval;       ///< a fifth of the fibre about h
     float hair_sigma_a[3];  ///< of the models without a medulla
-=======
-    FurParameters<3> coat, corrected, textured_medulla, textured_colour, textured;
-    Offsets interval;  ///< a fifth of the fibre about h
-    float chiang_sigma_a[3];
->>>>>>> mends
 };
 
 /// Known directions as rays meet a fibre (in proportion to the width it shows them); h, light and numbers even.

@@ -115,7 +115,7 @@ TEST_CASE("Marschner: caustics and glints") {
     }
 }
 
-TEST_CASE("Marschner: S as printed, reciprocal; energies") {
+TEST_CASE("Marschner: S as printed, reciprocal, and energies") {
     // S with glints of no reach. His axis runs from root to tip: theta = -theta(Marschner).
     const Marschner<3> m = bare();
     const auto S = [&](double i, double r, double phi) {

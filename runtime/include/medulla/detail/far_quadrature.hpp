@@ -330,8 +330,8 @@ MEDULLA_FN void visit_scattered(const FarField<Channels>& field, Visit&& visit) 
     }
 }
 
-/// Mean energy and probability of the residual lobe, which is even in phi: once a field. Like TRT it rises with F at the
-/// rim, so it takes TRT's pieces.
+/// Mean energy and probability of the residual lobe, which is even in phi: once a field. Like TRT it rises with F at
+/// the rim, so it takes TRT's pieces.
 template <int Channels>
 MEDULLA_FN void average_residual(FarField<Channels>& field) noexcept {
     Four energy[std::size_t(Channels)], probability;

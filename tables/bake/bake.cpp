@@ -152,8 +152,7 @@ RowMatrix round_functions(const RowMatrix& B, const FibreRequest& r, Parts& part
                 sum += q * q;
             }
             parts.sums[k * r.rows + row] = sum;
-            const auto area = detail::row_area(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(r.rows));
-            whole += sum * static_cast<double>(area);
+            whole += 0.25 * sum * detail::row_area(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(r.rows));
         }
         rounded.row(row_k) /= whole * node_area;
     }

@@ -53,7 +53,10 @@ BakeErrors errors_against(const BakedMaterial& material, const std::vector<Light
                 result.worst = error, result.worst_theta_i = cell.theta_i, result.worst_h = cell.h;
         }
     result.lobes = each.size();
-    if (each.empty()) return result;
+    if (each.empty()) {
+        result.median = result.worst = 1;  // nothing is claimed
+        return result;
+    }
     std::sort(each.begin(), each.end());
     result.median = each[each.size() / 2];
     return result;

@@ -110,10 +110,12 @@ inline const char* describe(BakedStatus status) noexcept {
 /// A validated baked material where it lies. It borrows the bytes it was opened on.
 struct BakedMaterial {
     BakedHeader header = {};
-    const unsigned char* bytes = nullptr;  ///< of the pack; null: not open
-    float x[absorption_nodes] = {};        ///< nodes of x
-    float inverse[absorption_nodes] = {};  ///< 1 / product of their differences
-    float unit[max_exit_functions] = {};   ///< density [1 / radian^2] of one square of B_k
+    const unsigned char* bytes = nullptr;         ///< of the pack; null: not open
+    float x[absorption_nodes] = {};               ///< nodes of x
+    float inverse[absorption_nodes] = {};         ///< 1 / product of their differences
+    float unit[max_exit_functions] = {};          ///< density [1 / radian^2] of one square of B_k
+    float area[max_exit_functions] = {};          ///< 1 / unit
+    std::uint64_t mass[max_exit_functions] = {};  ///< sum of four times its squares, three times in the outermost rows
 
     MEDULLA_FN explicit operator bool() const noexcept { return bytes != nullptr; }
     MEDULLA_FN std::uint32_t offsets() const noexcept { return header.offsets_inside + header.offsets_beyond; }
@@ -157,9 +159,10 @@ struct BakedResult {
 
 namespace detail {
 
-/// Area of the hat of a row over that of one inside: the outermost ones end at the pole, half a cell away.
-MEDULLA_FN float row_area(std::uint32_t row, std::uint32_t rows) noexcept {
-    return row == 0 || row + 1 == rows ? 0.75f : 1.0f;
+/// Four times the area of the hat of a row over that of one inside: the outermost ones end at the pole, half a cell
+/// away.
+MEDULLA_FN std::uint32_t row_area(std::uint32_t row, std::uint32_t rows) noexcept {
+    return row == 0 || row + 1 == rows ? 3 : 4;
 }
 
 /// Coordinate x of an absorption: even steps of it are even errors, and it is 1 at infinity.
@@ -230,7 +233,7 @@ inline BakedResult open_baked(const void* data, std::size_t size) noexcept {
         !detail::all_within(bytes + h.scales_offset, cells * absorption_nodes, 4.0f))
         return fail(BakedStatus::bad_number);
     for (std::uint32_t k = 0; k < h.functions; ++k) {
-        double whole = 0;
+        std::uint64_t whole = 0;
         for (std::uint32_t row = 0; row < h.rows; ++row) {
             std::uint32_t sum = 0;
             for (std::uint32_t column = 0; column < h.columns; ++column) {
@@ -238,11 +241,11 @@ inline BakedResult open_baked(const void* data, std::size_t size) noexcept {
                 sum += b * b;
             }
             if (sum != material.row_sum(k, row)) return fail(BakedStatus::bad_sum);
-            whole += double(sum) * double(detail::row_area(row, h.rows));
+            whole += std::uint64_t(sum) * detail::row_area(row, h.rows);
         }
-        if (!(whole > 0)) return fail(BakedStatus::bad_sum);
-        const double node_area = pi / h.rows * (2 * pi / h.columns);
-        material.unit[k] = float(1 / (whole * node_area));
+        if (whole == 0) return fail(BakedStatus::bad_sum);
+        const double area = 0.25 * double(whole) * (pi / h.rows) * (2 * pi / h.columns);
+        material.mass[k] = whole, material.area[k] = float(area), material.unit[k] = float(1 / area);
     }
     for (int j = 0; j < absorption_nodes; ++j) material.x[j] = detail::absorption_place(h, h.sigma[j]);
     for (int j = 0; j < absorption_nodes; ++j) {

@@ -70,28 +70,21 @@ struct ScatteredLight {
     /// Of B_k and its mirror image, densities per radian^2: channels and, last, what is drawn. Set as far as 2 K.
     alignas(16) float amplitude[2 * max_exit_functions][std::size_t(lanes)];
 
-    /// Mean energy of the channels.
-    MEDULLA_HOT float energy(const BakedMaterial& m) const noexcept {
-        float sum = 0;
-        for (std::uint32_t k = 0; k < 2 * m.header.functions; ++k) {
-            float channels = 0;
-            for (int c = 0; c < Channels; ++c) channels += amplitude[k][c];
-            sum += channels / m.unit[k % m.header.functions];
-        }
-        return sum * (1.0f / float(Channels));
-    }
     MEDULLA_HOT void scale(const BakedMaterial& m, float factor) noexcept {
         for (std::uint32_t k = 0; k < 2 * m.header.functions; ++k)
-            for (int c = 0; c < lanes; ++c) amplitude[k][c] *= factor;
+            for (int b = 0; b < lanes; b += 4)
+                store_four(aligned_four_at(amplitude[k] + b) * Four(factor), amplitude[k] + b);
     }
     /// What is drawn: the mean of the channels times `share`, which makes all probabilities add up to 1.
-    MEDULLA_HOT void set_drawn(const BakedMaterial& m, float share) noexcept {
+    /// @param energy mean of the channels
+    MEDULLA_HOT void set_drawn(const BakedMaterial& m, float energy, float share) noexcept {
+        const float each = share * (1.0f / float(Channels));
         for (std::uint32_t k = 0; k < 2 * m.header.functions; ++k) {
             float channels = 0;
             for (int c = 0; c < Channels; ++c) channels += amplitude[k][c];
-            amplitude[k][lanes - 1] = channels * share * (1.0f / float(Channels));
+            amplitude[k][lanes - 1] = channels * each;
         }
-        probability = energy(m) * share;
+        probability = energy * share;
     }
     /// @param u in [0, 1]
     MEDULLA_HOT DrawnExit draw(const BakedMaterial& m, float u, const RandomNumbers& numbers) const noexcept {
@@ -99,7 +92,7 @@ struct ScatteredLight {
         float left = u * probability, mass = 0;
         std::uint32_t chosen = 0;
         for (std::uint32_t k = 0; k < 2 * functions; ++k) {
-            const float p = amplitude[k][lanes - 1] / m.unit[k % functions];
+            const float p = amplitude[k][lanes - 1] * m.area[k < functions ? k : k - functions];
             if (!(p > 0)) continue;
             left -= mass;
             mass = p, chosen = k;
@@ -152,10 +145,10 @@ MEDULLA_HOT BakedOffset baked_offset(const BakedMaterial& m, const Inclination<f
     o.energy = energies_without_absorption(m, o.path, o.cells, at.inverse_cos_t);
     return o;
 }
-/// Its scattered light, but for what is drawn. @param weight of the offset
+/// Its scattered light, but for what is drawn. @param weight of the offset  @return energy, mean of the channels
 template <int Channels>
-MEDULLA_HOT void set_light(const BakedFibre<Channels>& fibre, const BakedOffset& o, float h, float weight,
-                           ScatteredLight<Channels>& light) noexcept {
+MEDULLA_HOT float set_light(const BakedFibre<Channels>& fibre, const BakedOffset& o, float h, float weight,
+                            ScatteredLight<Channels>& light) noexcept {
     const BakedMaterial& m = *fibre.material;
     light.side = h < 0 ? -1.0f : 1.0f;
     light.turn = m.header.turn * 2 * (o.path.gamma_t - o.path.gamma_i);
@@ -166,7 +159,10 @@ MEDULLA_HOT void set_light(const BakedFibre<Channels>& fibre, const BakedOffset&
         store_four(Four(weight * o.energy.scattered) *
                        exponential(Four(-shortest) * aligned_four_at(fibre.fibre.sigma_ca + b)),
                    energy + b);
-    set_amplitudes(m, o.cells, fibre.weight, energy, light.amplitude);
+    const Colour<lanes> energies = set_amplitudes(m, o.cells, fibre.weight, energy, light.amplitude);
+    float mean = 0;
+    for (int c = 0; c < Channels; ++c) mean += energies[c];
+    return mean * (1.0f / float(Channels));
 }
 
 }  // namespace detail
@@ -214,7 +210,7 @@ struct BakedField {
             if (!other.valid) return s;
             lobe = other.lobe, exit = {other.angles.theta, other.angles.phi};
         } else {
-            exit = light[chosen - part_count].draw(*material, u.lobe, u);
+            exit = run_fused([&] { return light[chosen - part_count].draw(*material, u.lobe, u); });
         }
         // Sets the direction; then its value.
         Evaluation<Channels> e;
@@ -249,7 +245,7 @@ struct BakedField {
         for (int i = 0; material != nullptr && i < light_count; ++i)
             for (std::uint32_t k = 0; k < 2 * material->header.functions; ++k)
                 for (int c = 0; c < Channels; ++c)
-                    result[c] += light[i].amplitude[k][c] / material->unit[k % material->header.functions];
+                    result[c] += light[i].amplitude[k][c] * material->area[k % material->header.functions];
         return result;
     }
 
@@ -320,9 +316,9 @@ MEDULLA_HOT BakedNear<Channels> make_near(const BakedFibre<Channels>& fibre, con
     const Inclination<float> at = inclination(p.eta, known.cosine, Fresnel::exact);
     const BakedOffset o = baked_offset(*fibre.material, at, hit.part[0].known_theta, h);
     const float others = scale_lobes(hit.part[0], o.energy.R_factor, o.energy.entered_factor);
-    set_light(fibre, o, h, 1, hit.light[0]);
-    const float all = others + hit.light[0].energy(*fibre.material), share = all > 1e-30f ? 1 / all : 0.0f;
-    hit.light[0].set_drawn(*fibre.material, share);
+    const float scattered = set_light(fibre, o, h, 1, hit.light[0]);
+    const float all = others + scattered, share = all > 1e-30f ? 1 / all : 0.0f;
+    hit.light[0].set_drawn(*fibre.material, scattered, share);
     hit.scale[0] = 1, hit.probability[0] = others * share;
     return hit;
 }
@@ -365,21 +361,22 @@ MEDULLA_FN BakedFar<Channels> make_far(const BakedFibre<Channels>& fibre, const 
     // Offsets of the scattered light: within the rim, if the range has some there.
     float from = low > -all.gamma_rim ? low : -all.gamma_rim, to = high < all.gamma_rim ? high : all.gamma_rim;
     if (!(to > from)) from = low, to = high;
-    float sum = 0;
+    float sum = 0, energy[8];
     visit(gauss_rule(0), from, to, [&](int i, float h, float weight) {
         const BakedOffset o = baked_offset(m, at, theta_i, h);
-        set_light(fibre, o, h, weight, field.light[i]);
+        energy[i] = set_light(fibre, o, h, weight, field.light[i]);
         sum += weight * o.energy.scattered;
     });
     const float balance = sum > 1e-30f ? scattered / sum : 0.0f;
     float mean[2] = {R_simulated, absorbing * field.scale[1]}, total = mean[0] + mean[1];
-    for (auto& light : field.light) {
-        light.scale(m, balance);
-        total += light.energy(m);
+    for (int i = 0; i < 8; ++i) {
+        field.light[i].scale(m, balance);
+        energy[i] *= balance;
+        total += energy[i];
     }
     const float share = total > 1e-30f ? 1 / total : 0.0f;
     for (int i = 0; i < 2; ++i) field.probability[i] = mean[i] * share;
-    for (auto& light : field.light) light.set_drawn(m, share);
+    for (int i = 0; i < 8; ++i) field.light[i].set_drawn(m, energy[i], share);
     return field;
 }
 

@@ -8,6 +8,7 @@
 #include "medulla/config.hpp"
 #include "medulla/detail/elementary.hpp"
 #include "medulla/detail/lanes.hpp"
+#include "medulla/vector.hpp"
 
 namespace medulla {
 inline namespace MEDULLA_TARGET {
@@ -78,11 +79,13 @@ MEDULLA_HOT float energy_at(const BakedMaterial& m, const CellBlend& at, int whi
 /// Amplitudes of the 2 K functions at a hit, channels side by side: densities per radian^2 for a unit of light.
 /// @param weight [absorption] of the channels in lanes; 0 in unused lanes
 /// @param energy E times the weight of the offset, and what the shortest way leaves of each channel
+/// @return energies of the channels: amplitudes times the areas of their functions
 template <int lanes>
-MEDULLA_HOT void set_amplitudes(const BakedMaterial& m, const CellBlend& at,
-                                const float (&weight)[absorption_nodes][lanes], const float (&energy)[lanes],
-                                float (*amplitude)[lanes]) noexcept {
+MEDULLA_HOT Colour<lanes> set_amplitudes(const BakedMaterial& m, const CellBlend& at,
+                                         const float (&weight)[absorption_nodes][lanes], const float (&energy)[lanes],
+                                         float (*amplitude)[lanes]) noexcept {
     const std::uint32_t functions = m.header.functions;
+    Four whole[lanes / 4];
     for (std::uint32_t k = 0; k < 2 * functions; k += 4) {
         alignas(16) float blend[absorption_nodes][4];
         for (int j = 0; j < absorption_nodes; ++j) {
@@ -93,14 +96,19 @@ MEDULLA_HOT void set_amplitudes(const BakedMaterial& m, const CellBlend& at,
         }
         for (std::uint32_t n = 0; n < 4; ++n) {
             const std::uint32_t f = k + n < functions ? k + n : k + n - functions;
-            const Four unit(m.unit[f]);
+            const Four unit(m.unit[f]), area(m.area[f]);
             for (int b = 0; b < lanes; b += 4) {
                 Four a(0.0f);
                 for (int j = 0; j < absorption_nodes; ++j) a = a + Four(blend[j][n]) * four_at(weight[j] + b);
-                store_four(greater(a, Four(0.0f)) * (unit * four_at(energy + b)), amplitude[k + n] + b);
+                a = greater(a, Four(0.0f)) * (unit * four_at(energy + b));
+                whole[b / 4] = whole[b / 4] + a * area;
+                store_four(a, amplitude[k + n] + b);
             }
         }
     }
+    Colour<lanes> energies;
+    for (int b = 0; b < lanes / 4; ++b) store_four(whole[b], energies.value + 4 * b);
+    return energies;
 }
 
 /// The nodes about an exit: two rows with their weights, and two columns.
@@ -171,31 +179,35 @@ struct DrawnExit {
     float theta, phi;  ///< [radians]
 };
 /// Draws from B_k: a node by its square, then within its hats.
-MEDULLA_FN DrawnExit sample_function(const BakedMaterial& m, std::uint32_t k, float u, float v) noexcept {
+MEDULLA_HOT DrawnExit sample_function(const BakedMaterial& m, std::uint32_t k, float u, float v) noexcept {
     const BakedHeader& h = m.header;
-    const auto weight = [&](std::uint32_t row) { return float(m.row_sum(k, row)) * row_area(row, h.rows); };
-    float whole = 0;
-    for (std::uint32_t row = 0; row < h.rows; ++row) whole += weight(row);
-    float left = u * whole, mass = 0;
+    // In whole numbers: `below` of the mass lies before the node.
+    const double place = double(u) * double(m.mass[k]);
+    std::uint64_t below = 0, mass = 0;
     std::uint32_t row = 0;
     for (std::uint32_t r = 0; r < h.rows; ++r) {
-        const float w = weight(r);
-        if (!(w > 0)) continue;
-        if (mass > 0) left -= mass;
+        const std::uint64_t w = std::uint64_t(m.row_sum(k, r)) * row_area(r, h.rows);
+        if (w == 0) continue;
+        below += mass;
         row = r, mass = w;
-        if (left < w) break;
+        if (place < double(below + w)) break;
     }
-    u = left < mass ? (left > 0 ? left / mass : 0.0f) : 1.0f;
-    float rest = v * float(m.row_sum(k, row)), square = 0;
-    std::uint32_t column = 0;
+    const std::uint32_t sum = m.row_sum(k, row);
+    const auto target = std::uint32_t(double(v) * double(sum));
+    std::uint32_t before = 0, square = 0, column = 0;
+    const unsigned char* node = m.node(row, 0) + k;
     for (std::uint32_t c = 0; c < h.columns; ++c) {
-        const float b = float(m.node(row, c)[k]);
-        if (!(b > 0)) continue;
-        if (square > 0) rest -= square;
+        const std::uint32_t b = node[std::size_t(c) * h.functions];
+        if (b == 0) continue;
+        before += square;
         column = c, square = b * b;
-        if (rest < square) break;
+        if (target < before + square) break;
     }
-    v = rest < square ? (rest > 0 ? rest / square : 0.0f) : 1.0f;
+    const auto share = [](double part, double whole) {
+        const float x = float(part / whole);
+        return x > 0 ? (x < 1 ? x : 1.0f) : 0.0f;
+    };
+    u = share(place - double(below), double(mass)), v = share(double(v) * sum - before, square);
     const float y = float(row) + 0.5f + sample_hat(row == 0 ? 0.5f : 1.0f, row + 1 == h.rows ? 0.5f : 1.0f, u);
     const float x = float(column) + 0.5f + sample_hat(1, 1, v);
     return {(y / float(h.rows) - 0.5f) * float(pi), (x / float(h.columns) - 0.5f) * float(2 * pi)};

@@ -3,6 +3,7 @@
 #include <initializer_list>
 #include <limits>
 
+#include "medulla/baked_field.hpp"
 #include "medulla/medulla.hpp"
 #include "medulla/models/from_fur.hpp"
 
@@ -37,6 +38,8 @@ static void print_models(const FurParameters<2>& p, const DenseTables* tables) {
     print_model(far_field(deon_of(p), known));
     print_model(near_field(chiang_of(p), known, 0.4f));
     print_model(near_field(yan2015_of(p), tables, known, 0.4f));
+    print_model(near_field(BakedFibre<2>(), known, 0.4f));  // without a bake it is black: that it compiles is the test
+    print_model(far_field(BakedFibre<2>(), known));
 }
 
 int main() {

@@ -144,8 +144,15 @@ struct BakedMaterial {
     MEDULLA_FN FurParameters<3> parameters() const noexcept {
         FurParameters<3> p;
         const BakedHeader& h = header;
-        p.eta = h.eta, p.kappa = h.kappa, p.alpha = h.alpha, p.beta_m = h.beta_m, p.beta_n = h.beta_n;
-        p.layers = h.layers, p.sigma_ms = h.sigma_ms, p.sigma_ma = h.sigma_ma, p.g = h.g;
+        p.eta = h.eta;
+        p.kappa = h.kappa;
+        p.alpha = h.alpha;
+        p.beta_m = h.beta_m;
+        p.beta_n = h.beta_n;
+        p.layers = h.layers;
+        p.sigma_ms = h.sigma_ms;
+        p.sigma_ma = h.sigma_ma;
+        p.g = h.g;
         for (int c = 0; c < 3; ++c) p.sigma_ca[c] = h.sigma_ca[c];
         p.fresnel = Fresnel::exact;
         return p;
@@ -245,7 +252,9 @@ inline BakedResult open_baked(const void* data, std::size_t size) noexcept {
         }
         if (whole == 0) return fail(BakedStatus::bad_sum);
         const double area = 0.25 * double(whole) * (pi / h.rows) * (2 * pi / h.columns);
-        material.mass[k] = whole, material.area[k] = float(area), material.unit[k] = float(1 / area);
+        material.mass[k] = whole;
+        material.area[k] = float(area);
+        material.unit[k] = float(1 / area);
     }
     for (int j = 0; j < absorption_nodes; ++j) material.x[j] = detail::absorption_place(h, h.sigma[j]);
     for (int j = 0; j < absorption_nodes; ++j) {

@@ -35,7 +35,8 @@ struct BakedFibre {
 /// @param material outlives the fibre  @param sigma_ca [1 / fibre radius]; accurate in the range of its nodes, and
 ///        going to 0 beyond
 template <int Channels>
-MEDULLA_FN BakedFibre<Channels> make_fibre(const BakedMaterial& material, const float (&sigma_ca)[Channels],
+MEDULLA_FN BakedFibre<Channels> make_fibre(const BakedMaterial& material,
+                                           const float (&sigma_ca)[std::size_t(Channels)],
                                            OutOfRange out = OutOfRange::black) noexcept {
     BakedFibre<Channels> f;
     if (!material) return f;
@@ -95,7 +96,8 @@ struct ScatteredLight {
             const float p = amplitude[k][lanes - 1] * m.area[k < functions ? k : k - functions];
             if (!(p > 0)) continue;
             left -= mass;
-            mass = p, chosen = k;
+            mass = p;
+            chosen = k;
             if (left < p) break;
         }
         const bool mirrored = chosen >= functions;
@@ -118,7 +120,8 @@ MEDULLA_HOT OffsetEnergies energies_without_absorption(const BakedMaterial& m, c
     const float T = path.cuticle.T_, x = exponential(-2 * m.header.sigma_ms * path.s_m * inverse_cos_t);
     const float stays = T + e.R * (1 - x);  // 1 - F x
     e.entered = stays > 1e-30f ? T * (T / stays) * x : 0.0f;
-    e.R_factor = energy_at(m, cells, 0), e.entered_factor = energy_at(m, cells, 1);
+    e.R_factor = energy_at(m, cells, 0);
+    e.entered_factor = energy_at(m, cells, 1);
     // What is simulated as R cannot be more than there is, nor the rest more than R leaves.
     const float R = e.R_factor * e.R;
     if (R > 1) e.R_factor /= R;
@@ -173,9 +176,9 @@ struct BakedField {
     static constexpr int lanes = detail::channel_lanes<Channels>;
     const BakedMaterial* material = nullptr;  ///< null: black
     detail::Polar known;
-    Unscattered part[part_count];
-    float scale[part_count] = {}, probability[part_count] = {};
-    detail::ScatteredLight<Channels> light[light_count];
+    Unscattered part[std::size_t(part_count)];
+    float scale[std::size_t(part_count)] = {}, probability[std::size_t(part_count)] = {};
+    detail::ScatteredLight<Channels> light[std::size_t(light_count)];
 
     /// As NearField and FarField have them.
     MEDULLA_FN Colour<Channels> value(Vector drawn) const noexcept { return evaluate(drawn).value; }
@@ -198,7 +201,8 @@ struct BakedField {
             const float p = i < part_count ? probability[i] : light[i - part_count].probability;
             if (!(p > 0)) continue;
             below += mass;
-            mass = p, chosen = i;
+            mass = p;
+            chosen = i;
             if (u.lobe < below + p) break;
         }
         if (chosen < 0) return s;
@@ -348,9 +352,11 @@ MEDULLA_FN BakedFar<Channels> make_far(const BakedFibre<Channels>& fibre, const 
     };
     visit(gauss_rule(3), low, high, [&](int, float h, float weight) {
         const BakedOffset o = baked_offset(m, at, theta_i, h);
-        R += weight * o.energy.R, R_simulated += weight * o.energy.R * o.energy.R_factor;
+        R += weight * o.energy.R;
+        R_simulated += weight * o.energy.R * o.energy.R_factor;
         const float simulated = weight * o.energy.entered * o.energy.entered_factor;
-        entered += weight * o.energy.entered, entered_simulated += simulated;
+        entered += weight * o.energy.entered;
+        entered_simulated += simulated;
         scattered += weight * o.energy.scattered;
         const auto e = energies(o.path, all.absorption, false);
         for (int c = 0; c < Channels; ++c)
@@ -360,7 +366,10 @@ MEDULLA_FN BakedFar<Channels> make_far(const BakedFibre<Channels>& fibre, const 
     field.scale[1] = entered > 1e-30f ? entered_simulated / entered : 0.0f;
     // Offsets of the scattered light: within the rim, if the range has some there.
     float from = low > -all.gamma_rim ? low : -all.gamma_rim, to = high < all.gamma_rim ? high : all.gamma_rim;
-    if (!(to > from)) from = low, to = high;
+    if (!(to > from)) {
+        from = low;
+        to = high;
+    }
     float sum = 0, energy[8];
     visit(gauss_rule(0), from, to, [&](int i, float h, float weight) {
         const BakedOffset o = baked_offset(m, at, theta_i, h);

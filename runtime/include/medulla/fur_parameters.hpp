@@ -94,9 +94,16 @@ namespace detail {
 constexpr FurPreset corrected(const FurPreset& p, const char* name, float sigma_ca, float sigma_ms, float sigma_ma,
                               float g, float layers, float red, float green, float blue) noexcept {
     FurPreset row = p;
-    row.name = name, row.scattering = Scattering::corrected;
-    row.sigma_ca = sigma_ca, row.sigma_ms = sigma_ms, row.sigma_ma = sigma_ma, row.g = g, row.layers = layers;
-    row.coat[0] = red, row.coat[1] = green, row.coat[2] = blue;
+    row.name = name;
+    row.scattering = Scattering::corrected;
+    row.sigma_ca = sigma_ca;
+    row.sigma_ms = sigma_ms;
+    row.sigma_ma = sigma_ma;
+    row.g = g;
+    row.layers = layers;
+    row.coat[0] = red;
+    row.coat[1] = green;
+    row.coat[2] = blue;
     return row;
 }
 

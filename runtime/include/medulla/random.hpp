@@ -2,6 +2,7 @@
 // Rests on nothing but integer arithmetic.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "medulla/config.hpp"
@@ -12,7 +13,7 @@ inline namespace MEDULLA_TARGET {
 /// Random numbers in (0, 1).
 template <int Count>
 struct Stretched {
-    float u[Count] = {};
+    float u[std::size_t(Count)] = {};
 };
 
 namespace detail {

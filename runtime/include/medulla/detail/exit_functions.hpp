@@ -22,7 +22,7 @@ MEDULLA_HOT Four squares_at(const unsigned char* b) noexcept {
     const __m128i zero = _mm_setzero_si128();
     const Four x(_mm_cvtepi32_ps(_mm_unpacklo_epi16(_mm_unpacklo_epi8(_mm_cvtsi32_si128(packed), zero), zero)));
 #else
-    const Four x(float(b[0]), float(b[1]), float(b[2]), float(b[3]));
+    const Four x = Four(float(b[0]), float(b[1]), float(b[2]), float(b[3]));
 #endif
     return x * x;
 }
@@ -80,10 +80,10 @@ MEDULLA_HOT float energy_at(const BakedMaterial& m, const CellBlend& at, int whi
 /// @param weight [absorption] of the channels in lanes; 0 in unused lanes
 /// @param energy E times the weight of the offset, and what the shortest way leaves of each channel
 /// @return energies of the channels: amplitudes times the areas of their functions
-template <int lanes>
-MEDULLA_HOT Colour<lanes> set_amplitudes(const BakedMaterial& m, const CellBlend& at,
-                                         const float (&weight)[absorption_nodes][lanes], const float (&energy)[lanes],
-                                         float (*amplitude)[lanes]) noexcept {
+template <std::size_t lanes>
+MEDULLA_HOT Colour<int(lanes)> set_amplitudes(const BakedMaterial& m, const CellBlend& at,
+                                              const float (&weight)[absorption_nodes][lanes],
+                                              const float (&energy)[lanes], float (*amplitude)[lanes]) noexcept {
     const std::uint32_t functions = m.header.functions;
     Four whole[lanes / 4];
     for (std::uint32_t k = 0; k < 2 * functions; k += 4) {
@@ -97,7 +97,7 @@ MEDULLA_HOT Colour<lanes> set_amplitudes(const BakedMaterial& m, const CellBlend
         for (std::uint32_t n = 0; n < 4; ++n) {
             const std::uint32_t f = k + n < functions ? k + n : k + n - functions;
             const Four unit(m.unit[f]), area(m.area[f]);
-            for (int b = 0; b < lanes; b += 4) {
+            for (std::size_t b = 0; b < lanes; b += 4) {
                 Four a(0.0f);
                 for (int j = 0; j < absorption_nodes; ++j) a = a + Four(blend[j][n]) * four_at(weight[j] + b);
                 a = greater(a, Four(0.0f)) * (unit * four_at(energy + b));
@@ -106,8 +106,8 @@ MEDULLA_HOT Colour<lanes> set_amplitudes(const BakedMaterial& m, const CellBlend
             }
         }
     }
-    Colour<lanes> energies;
-    for (int b = 0; b < lanes / 4; ++b) store_four(whole[b], energies.value + 4 * b);
+    Colour<int(lanes)> energies;
+    for (std::size_t b = 0; b < lanes / 4; ++b) store_four(whole[b], energies.value + 4 * b);
     return energies;
 }
 
@@ -119,11 +119,14 @@ struct ExitCorners {
 MEDULLA_HOT void set_rows(const BakedHeader& h, float theta_r, ExitCorners& at) noexcept {
     const float rows = float(h.rows), y = (theta_r * float(1 / pi) + 0.5f) * rows - 0.5f, last = rows - 1;
     const Between r = between(y, h.rows);
-    at.row[0] = r.lower, at.row[1] = r.lower + 1;
-    at.row_weight[0] = 1 - r.weight, at.row_weight[1] = r.weight;
+    at.row[0] = r.lower;
+    at.row[1] = r.lower + 1;
+    at.row_weight[0] = 1 - r.weight;
+    at.row_weight[1] = r.weight;
     // Beyond the outermost nodes, down to 0 at the pole.
     const float beyond = y < 0 ? -y : (y > last ? y - last : 0.0f), left = beyond < 0.5f ? 1 - 2 * beyond : 0.0f;
-    at.row_weight[0] *= left, at.row_weight[1] *= left;
+    at.row_weight[0] *= left;
+    at.row_weight[1] *= left;
 }
 /// @param phi [radians], |phi| < 1e4
 MEDULLA_HOT void set_columns(const BakedHeader& h, float phi, ExitCorners& at) noexcept {
@@ -134,17 +137,19 @@ MEDULLA_HOT void set_columns(const BakedHeader& h, float phi, ExitCorners& at) n
     if (shifted < 0) shifted += columns;
     std::uint32_t lower = std::uint32_t(shifted);
     if (lower >= h.columns) lower = h.columns - 1;
-    at.column[0] = lower, at.column[1] = lower + 1 < h.columns ? lower + 1 : 0;
-    at.column_weight[1] = shifted - float(lower), at.column_weight[0] = 1 - at.column_weight[1];
+    at.column[0] = lower;
+    at.column[1] = lower + 1 < h.columns ? lower + 1 : 0;
+    at.column_weight[1] = shifted - float(lower);
+    at.column_weight[0] = 1 - at.column_weight[1];
 }
 
 /// Adds sum over k of amplitude[k] times the squares of B_k, at an exit whose corners are given.
-template <int lanes>
+template <std::size_t lanes>
 MEDULLA_HOT void add_functions(const BakedMaterial& m, const ExitCorners& at, const float (*amplitude)[lanes],
                                float (&sum)[lanes]) noexcept {
     const std::uint32_t functions = m.header.functions, last = m.header.columns - 1;
     Four total[lanes / 4];
-    for (int b = 0; b < lanes / 4; ++b) total[b] = four_at(sum + 4 * b);
+    for (std::size_t b = 0; b < lanes / 4; ++b) total[b] = four_at(sum + 4 * b);
     for (std::uint32_t mirrored = 0; mirrored < 2; ++mirrored) {
         const unsigned char* corner[4];
         float weight[4];
@@ -157,12 +162,12 @@ MEDULLA_HOT void add_functions(const BakedMaterial& m, const ExitCorners& at, co
             Four b(0.0f);
             for (int i = 0; i < 4; ++i) b = b + Four(weight[i]) * squares_at(corner[i] + k);
             const float(*a)[lanes] = amplitude + mirrored * functions + k;
-            for (int c = 0; c < lanes / 4; ++c)
+            for (std::size_t c = 0; c < lanes / 4; ++c)
                 total[c] = total[c] + (spread<0>(b) * four_at(a[0] + 4 * c) + spread<1>(b) * four_at(a[1] + 4 * c)) +
                            (spread<2>(b) * four_at(a[2] + 4 * c) + spread<3>(b) * four_at(a[3] + 4 * c));
         }
     }
-    for (int b = 0; b < lanes / 4; ++b) store_four(total[b], sum + 4 * b);
+    for (std::size_t b = 0; b < lanes / 4; ++b) store_four(total[b], sum + 4 * b);
 }
 
 /// Draws from a hat: offset from its node [cells], in [-lower, upper]. @param u in [0, 1]
@@ -189,7 +194,8 @@ MEDULLA_HOT DrawnExit sample_function(const BakedMaterial& m, std::uint32_t k, f
         const std::uint64_t w = std::uint64_t(m.row_sum(k, r)) * row_area(r, h.rows);
         if (w == 0) continue;
         below += mass;
-        row = r, mass = w;
+        row = r;
+        mass = w;
         if (place < double(below + w)) break;
     }
     const std::uint32_t sum = m.row_sum(k, row);
@@ -200,14 +206,16 @@ MEDULLA_HOT DrawnExit sample_function(const BakedMaterial& m, std::uint32_t k, f
         const std::uint32_t b = node[std::size_t(c) * h.functions];
         if (b == 0) continue;
         before += square;
-        column = c, square = b * b;
+        column = c;
+        square = b * b;
         if (target < before + square) break;
     }
     const auto share = [](double part, double whole) {
         const float x = float(part / whole);
         return x > 0 ? (x < 1 ? x : 1.0f) : 0.0f;
     };
-    u = share(place - double(below), double(mass)), v = share(double(v) * sum - before, square);
+    u = share(place - double(below), double(mass));
+    v = share(double(v) * sum - before, square);
     const float y = float(row) + 0.5f + sample_hat(row == 0 ? 0.5f : 1.0f, row + 1 == h.rows ? 0.5f : 1.0f, u);
     const float x = float(column) + 0.5f + sample_hat(1, 1, v);
     return {(y / float(h.rows) - 0.5f) * float(pi), (x / float(h.columns) - 0.5f) * float(2 * pi)};

@@ -138,7 +138,8 @@ MEDULLA_FN void plan_tables(const PackView& pack, const TableRanges& asked, Tabl
     if (plan.corrected) {
         if (plan.axis[3].spans + 3 > most_solved_rows || plan.axis[5].spans + 3 > most_solved_rows)
             return fail(TablesStatus::bad_axes);
-        clamp_ends(plan.axis[3]), clamp_ends(plan.axis[5]);
+        clamp_ends(plan.axis[3]);
+        clamp_ends(plan.axis[5]);
     }
     t.one_material = of_one_material(asked) && plan.axis[3].spans + 3 <= most_solved_rows ? 1u : 0u;
     if (t.one_material && !plan.corrected) clamp_ends(plan.axis[3]);

@@ -115,7 +115,8 @@ MEDULLA_FN int draw_of(const float (&share)[std::size_t(Count)], float& u) noexc
     float below = 0, at_last = 0;
     for (int k = 0; k < Count; ++k) {
         if (!(share[k] > 0)) continue;
-        last = k, at_last = below;
+        last = k;
+        at_last = below;
         if (u < below + share[k]) break;
         below += share[k];
     }

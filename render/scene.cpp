@@ -130,6 +130,11 @@ std::vector<Stop> read_along(Fields& f, const std::vector<Material>& materials, 
         if (!stops.empty() && !(at > stops.back().at))
             throw Error("{}/0: expected a number > {:g}, found {:g}", place, stops.back().at, at);
         stops.push_back({at, material_named(materials, list[i][1], place + "/1")});
+        const FurParameters<3>&p = materials[std::size_t(stops.back().material)].fur,
+              &first = materials[std::size_t(stops[0].material)].fur;
+        if (p.scattering != first.scattering || p.fresnel != first.fresnel)
+            throw Error("{}/1: expected a material of the first one's scattering and fresnel, found {}", place,
+                        quoted(list[i][1]));
     }
     if (stops.empty()) throw Error("{}: expected at least one entry", f.place("along"));
     return stops;

@@ -13,7 +13,7 @@ constexpr double least = 1e-12;  // of the greatest entry: a factor that is 0 co
 /// @return the greatest change of an entry
 double improve(RowMatrix& C, const RowMatrix& G, const RowMatrix& P, double floor) {
     double greatest = 0;
-#pragma omp parallel for schedule(static) reduction(max : greatest)
+#pragma omp parallel for schedule(static) reduction(max : greatest) if (C.rows() >= 256)
     for (Eigen::Index i = 0; i < C.rows(); ++i)
         for (Eigen::Index k = 0; k < C.cols(); ++k) {
             if (!(G(k, k) > 0)) continue;

@@ -212,8 +212,10 @@ struct Yan2015Hit : Hit<Yan2015Hit<Channels>, Channels> {
 
     /// M^s at theta_r [1 / radian]: C^M inside the medulla, refracted and attenuated on its way out (Eq. 18).
     MEDULLA_FN float scattered_along(float theta, float cosine, float forwardness) const noexcept {
-        const float b = raw_along(theta, cosine, 0) * scale[0], f = raw_along(theta, cosine, 1) * scale[1];
-        return b + forwardness * (f - b);
+        const Outgoing o = outgoing(theta, cosine);
+        // The blend of two sides, each times its scale, as one lookup.
+        const float forward = forwardness * scale[1], all_of_it = (1 - forwardness) * scale[0] + forward;
+        return o.factor * all_of_it * detail::longitudinal_density(*tables, along, o.exit, 0, forward / all_of_it);
     }
 
     MEDULLA_FN Evaluation<Channels> at(float theta, float cosine, float phi) const noexcept {
@@ -278,7 +280,12 @@ struct Yan2015Hit : Hit<Yan2015Hit<Channels>, Channels> {
         const ExitPlaces exit = exit_places(turns_of(Four(side * (phi - ray.centre[k]))), Four(2 * tables->phi.end));
         return (1 - blur) * azimuthal_density(*tables, across, exit, 0) + blur * float(0.5 / pi);
     }
-    MEDULLA_FN float raw_along(float theta, float cosine, float forwardness) const noexcept {
+    /// The way out at theta_r: what of C^M passes both surfaces, and where C^M is read.
+    struct Outgoing {
+        float factor;
+        detail::ExitPlaces exit;
+    };
+    MEDULLA_FN Outgoing outgoing(float theta, float cosine) const noexcept {
         using namespace detail;
         // The surfaces are met in the plane of the fibre: the cuticle's is tilted, the medulla's is not.
         const float sine = sine_cosine(theta).sine, sin_c = sine * inverse_c, sin_m = sine * inverse_m;
@@ -289,9 +296,8 @@ struct Yan2015Hit : Hit<Yan2015Hit<Channels>, Channels> {
         const float out = cuticle(layers, excess, cos_o, math::sqrt(excess + cos_o * cos_o)).T_,
                     through = medulla_surface(cos_c, m).T_;
         const float inside = angle(sin_m, cos_m);
-        const ExitPlaces exit =
-            exit_places(turns_of(Four(this->known_theta < 0 ? -inside : inside)), Four(4 * tables->theta_r.end));
-        return out * through * longitudinal_density(*tables, along, exit, 0, forwardness) * cosine * inverse_m / cos_m;
+        return {out * through * cosine * inverse_m / cos_m,
+                exit_places(turns_of(Four(this->known_theta < 0 ? -inside : inside)), Four(4 * tables->theta_r.end))};
     }
     MEDULLA_FN void set_medulla(const Yan2015<Channels>& p, const DenseTables& dense) noexcept {
         using namespace detail;
@@ -312,7 +318,9 @@ struct Yan2015Hit : Hit<Yan2015Hit<Channels>, Channels> {
         for (int i = 0; i < 64; ++i) {
             const float s = (float(i) + 0.5f) / 32 - 1, theta = float(pi / 4) * s * (3 - s * s),
                         weight = float(3 * pi / 4) * (1 - s * s) / 32, cosine = cosine_of(theta);
-            for (int f = 0; f < 2; ++f) sum[f] += weight * raw_along(theta, cosine, float(f));
+            const Outgoing o = outgoing(theta, cosine);
+            for (int f = 0; f < 2; ++f)
+                sum[f] += weight * o.factor * longitudinal_density(*tables, along, o.exit, 0, float(f));
         }
         for (int f = 0; f < 2; ++f) scale[f] = sum[f] > 1e-30f ? 1 / sum[f] : 0.0f;
         if (!(sum[0] > 1e-30f && sum[1] > 1e-30f)) tables = nullptr;

@@ -181,10 +181,10 @@ std::vector<unsigned char> write_baked(const FibreLight& light, const BakeOption
     const FurParameters<3>& p = r.material.fur;
     std::vector<unsigned char> bytes(sizeof(BakedHeader));
     const auto append = [&](const void* data, std::size_t size) {
-        while (bytes.size() % 4 != 0) bytes.push_back(0);
-        const auto* first = static_cast<const unsigned char*>(data);
-        bytes.insert(bytes.end(), first, first + size);
-        return static_cast<std::uint32_t>(bytes.size() - size);
+        const std::size_t at = (bytes.size() + 3) / 4 * 4;
+        bytes.resize(at + size);
+        if (size > 0) std::memcpy(bytes.data() + at, data, size);
+        return static_cast<std::uint32_t>(at);
     };
     const auto whole = [](std::size_t n) { return static_cast<std::uint32_t>(n); };
     BakedHeader h = {};

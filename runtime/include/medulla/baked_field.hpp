@@ -34,10 +34,10 @@ struct BakedFibre {
 
 /// @param material outlives the fibre  @param sigma_ca [1 / fibre radius]; accurate in the range of its nodes, and
 ///        going to 0 beyond
-template <int Channels>
-MEDULLA_FN BakedFibre<Channels> make_fibre(const BakedMaterial& material,
-                                           const float (&sigma_ca)[std::size_t(Channels)],
-                                           OutOfRange out = OutOfRange::black) noexcept {
+template <std::size_t Count>
+MEDULLA_FN BakedFibre<int(Count)> make_fibre(const BakedMaterial& material, const float (&sigma_ca)[Count],
+                                             OutOfRange out = OutOfRange::black) noexcept {
+    constexpr int Channels = int(Count);
     BakedFibre<Channels> f;
     if (!material) return f;
     const FurParameters<3> own = material.parameters();

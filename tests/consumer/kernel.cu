@@ -6,7 +6,7 @@ using namespace medulla;
 
 // Host and device pass compile this file apart: one layout for both.
 static_assert(sizeof(DenseTables) == 296 && alignof(DenseTables) == 8, "layout");
-static_assert(sizeof(Fibre<3>) == 208 && alignof(Fibre<3>) == 16, "layout");
+static_assert(sizeof(Fibre<3>) == 240 && alignof(Fibre<3>) == 16, "layout");
 static_assert(sizeof(NearField<3>) == 368 && alignof(NearField<3>) == 16, "layout");
 static_assert(sizeof(FarField<3>) <= 2048 && alignof(FarField<3>) == 16, "layout");
 static_assert(sizeof(Sample<3>) == 56 && sizeof(Evaluation<3>) == 16 && sizeof(RandomNumbers) == 20, "layout");

@@ -43,7 +43,11 @@ extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, std::size_t siz
             static Precompute program;
             program.args = Arguments();
             program.app.parse(arguments);
-            if (is_error_map(program.app)) return 0;
+            if (program.app.count("--error-map") > 0) return 0;
+            if (program.app.count("--fibre") > 0) {
+                fibre_arguments(program.app, program.args);
+                return 0;
+            }
             const Job job = job_of(program.args);
             if (job.share && (job.share->index < 1 || job.share->index > job.share->count)) std::abort();
             check_request(job.request);

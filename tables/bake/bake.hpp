@@ -12,7 +12,7 @@
 namespace medulla::tables {
 
 struct BakeOptions {
-    int functions = 16;                    ///< exit functions stored: a multiple of 4, up to max_exit_functions
+    int functions = 12;                    ///< exit functions stored: a multiple of 4, up to max_exit_functions
     std::optional<double> max_error;       ///< instead: the fewest whose worst checked error is at most this
     std::optional<std::size_t> max_bytes;  ///< instead: the most within this size
     std::uint64_t seed = 1;

@@ -248,7 +248,7 @@ void add_compress(CLI::App& app, Action& action) {
             add_number(*size, "--rank", args.rank,
                        "components of each part: lobes have a mirror-even and an odd one (default 16). A pack "
                        "stores them padded with zeros to a multiple of 8, so that 4 take the bytes of 8. Of a fibre: "
-                       "exit functions, a multiple of 4 up to 24",
+                       "exit functions, a multiple of 4 up to 24 (default 12)",
                        {1, static_cast<int>(max_rank / 2)});
             add_number(*size, "--max-error", args.max_error,
                        "smallest pack that keeps this relative L2, rounding included; of a fibre: of the worst lobe",
